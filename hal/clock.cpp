@@ -1,0 +1,35 @@
+#include "hal/clock.hpp"
+
+#include <cerrno>
+#include <ctime>
+
+namespace moldloft::hal {
+namespace {
+
+Duration monotonic() noexcept {
+  timespec t{};
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return std::chrono::seconds{t.tv_sec} + std::chrono::nanoseconds{t.tv_nsec};
+}
+
+}  // namespace
+
+SteadyClock::SteadyClock() noexcept : start_{monotonic()} {}
+
+Instant SteadyClock::now() noexcept { return monotonic() - start_; }
+
+void SteadyClock::sleep_until(Instant wake) noexcept {
+  const auto absolute = wake + start_;
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(absolute);
+  const timespec t{.tv_sec = seconds.count(), .tv_nsec = (absolute - seconds).count()};
+  // clock_nanosleep returns its error number; it is not in errno, and it is positive.
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr) == EINTR) {
+  }
+}
+
+void VirtualClock::sleep_until(Instant wake) noexcept {
+  if (wake > now_) now_ = wake;
+  advance(now_);
+}
+
+}  // namespace moldloft::hal

@@ -1,0 +1,30 @@
+# What every room of the house shares: language, warnings, and the rule that includes point one way.
+
+set(CMAKE_CXX_STANDARD 23)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+set(CMAKE_LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
+
+add_library(moldloft_build_options INTERFACE)
+target_compile_options(moldloft_build_options INTERFACE
+  $<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wnon-virtual-dtor;-Woverloaded-virtual>
+  # A fused multiply-add rounds once where two operations round twice: with contraction on, a seed would mean
+  # different bytes on different machines.
+  -ffp-contract=off)
+
+# moldloft_room(NAME SOURCES ... PUBLIC ... PRIVATE ...): one room as one static library.
+# A room's headers are seen through a folder of its own that holds one link, to that room alone: a target that does
+# not link a room cannot include from it, so an include against the arrows does not compile.
+function(moldloft_room name)
+  cmake_parse_arguments(ROOM "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  set(view ${PROJECT_BINARY_DIR}/rooms/${name})
+  file(MAKE_DIRECTORY ${view})
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${name} ${view}/${name} SYMBOLIC)
+  add_library(moldloft_${name} STATIC ${ROOM_SOURCES})
+  add_library(moldloft::${name} ALIAS moldloft_${name})
+  target_include_directories(moldloft_${name} PUBLIC $<BUILD_INTERFACE:${view}>)
+  target_link_libraries(moldloft_${name} PUBLIC ${ROOM_PUBLIC} PRIVATE moldloft_build_options ${ROOM_PRIVATE})
+endfunction()
