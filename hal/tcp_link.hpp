@@ -1,0 +1,18 @@
+// A byte link over TCP, as client: standalone Asio underneath, its socket non-blocking, TCP_NODELAY set.
+// Connecting is a state that state() looks at, never a wait. Only numeric addresses and localhost names that the
+// resolver answers from its files are looked up, in open().
+//
+// Thread, blocking, allocation, failure: as ByteLink says. open() allocates; read(), write() and state() do not.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "hal/byte_link.hpp"
+
+namespace moldloft::hal {
+
+std::unique_ptr<ByteLink> make_tcp_link(std::string host, std::uint16_t port);
+
+}  // namespace moldloft::hal
