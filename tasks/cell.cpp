@@ -1,0 +1,275 @@
+#include "tasks/cell.hpp"
+
+#include <algorithm>
+#include <bit>
+
+#include "tasks/tool_pose.hpp"
+
+namespace moldloft::tasks {
+
+Cell::Cell(const CellSettings& settings, Clock& clock, hal::Scanner& scanner, hal::Robot& robot, hal::Recorder& recorder,
+           SurfaceTask& surface, const ShotArchive* archive)
+    : settings_{settings},
+      clock_{clock},
+      scanner_{scanner},
+      robot_{robot},
+      recorder_{recorder},
+      surface_{surface},
+      archive_{archive},
+      epoch_{settings.epoch},
+      tracker_{settings.tracker},
+      view_{settings.max_stripes, settings.max_points, settings.view},
+      surface_places_(settings.max_surface_shots) {
+  boundary_places_.reserve(static_cast<std::size_t>(settings.tracker.max_shots) + 1);
+}
+
+std::size_t Cell::plan_bytes() const {
+  return view_.bytes() + tracker_.bytes() +
+         (boundary_places_.capacity() + surface_places_.capacity()) * sizeof(ShotPlace);
+}
+
+void Cell::command(CellEvent event) {
+  commands_.fetch_or(1 << static_cast<int>(event), std::memory_order_relaxed);
+}
+
+void Cell::run(Instant now) {
+  now_ = now;
+  account();
+  if (const auto commands = static_cast<unsigned>(commands_.load(std::memory_order_relaxed)); commands != 0) {
+    const int first = std::countr_zero(commands);
+    commands_.fetch_and(~(1 << first), std::memory_order_relaxed);
+    const auto event = static_cast<CellEvent>(first);
+    if (event == CellEvent::hold) {
+      hold(HoldCause::person, "held by command: send unhold to go on");
+    } else {
+      apply(event);
+    }
+  }
+  if (const auto event = robot_.next_event()) on_robot(*event);
+  if (const auto event = scanner_.next_event()) on_scanner(*event);
+  advance_state();
+  publish();
+}
+
+void Cell::apply(CellEvent event, const hal::Message& text) {
+  const auto* row = find_transition(cell_transitions(), state_, event, CellContext{});
+  if (row == nullptr) return;
+  record("cell", to_string(event), to_string(state_), to_string(row->to), text);
+  state_ = row->to;
+  entered_ = now_;
+  enter(row->action);
+}
+
+void Cell::enter(CellAction action) {
+  switch (action) {
+    case CellAction::connect_and_calibrate:
+      started_ = last_account_ = now_;
+      counting_ = true;
+      start_step_ = StartStep::devices;
+      if (settings_.devices) start_devices();
+      break;
+    case CellAction::measure: measure(); break;
+    case CellAction::flush_records: counting_ = false; break;
+    case CellAction::stop_motion:
+    case CellAction::drop_everything:
+      counting_ = false;
+      wanted_.reset();
+      if (settings_.devices) robot_.stop(now_);
+      break;
+    case CellAction::synchronise_again:
+      cause_ = HoldCause::none;
+      why_ = {};
+      if (settings_.devices && robot_.state() == hal::RobotState::faulted) robot_.reset(now_);
+      break;
+    case CellAction::forget_run:
+      wanted_.reset();
+      shot_state_ = ShotState::parked;
+      set_phase(Phase::none);
+      break;
+    case CellAction::let_motion_end:
+    case CellAction::take_up_again:
+    case CellAction::none: break;
+  }
+}
+
+void Cell::hold(HoldCause cause, const hal::Message& why) {
+  if (state_ != CellState::execute && state_ != CellState::unholding) return;
+  cause_ = cause;
+  why_ = why;
+  apply(CellEvent::hold, why);
+}
+
+void Cell::abort(const hal::Message& why) {
+  if (state_ == CellState::aborting || state_ == CellState::aborted) return;
+  why_ = why;
+  cause_ = HoldCause::person;
+  apply(CellEvent::abort, why);
+}
+
+void Cell::on_robot(const hal::RobotEvent& event) {
+  using Kind = hal::RobotEvent::Kind;
+  switch (event.kind) {
+    case Kind::ready:
+      standing_ = event.pose;
+      calibrated_ = event.calibrated;
+      record("robot", "ready", "", "", event.text);
+      break;
+    case Kind::moving: break;
+    case Kind::done:
+      standing_ = event.pose;
+      if (state_ == CellState::starting && start_step_ == StartStep::calibrating) {
+        calibrated_ = true;
+      } else {
+        apply(ShotEvent::arrived);
+      }
+      break;
+    case Kind::refused:
+      record("robot", "refused", "", "", event.text);
+      if (state_ == CellState::starting) {
+        abort(event.text);
+      } else if (!arm_.turned_half) {
+        // The same stripes can be had with the head turned by half a turn, which puts the arm elsewhere.
+        arm_.turned_half = true;
+        arm_.place.head_yaw = geometry::wrapped_angle(arm_.place.head_yaw + std::numbers::pi);
+        arm_.commanded = tip_pose_for(arm_.place, settings_.tip_from_scanner);
+        if (const auto no = refuse_target(arm_.commanded, standing_, settings_.speed_percent, settings_.workspace)) {
+          abort(*no);
+        } else if (!robot_.move(arm_.commanded, settings_.speed_percent, now_)) {
+          abort("robot refused a target and takes no other: check it and clear");
+        }
+      } else {
+        abort(event.text);
+      }
+      break;
+    case Kind::fault:
+    case Kind::lost:
+      record("robot", event.kind == Kind::fault ? "fault" : "lost", "", "", event.text);
+      abort(event.text);
+      break;
+  }
+}
+
+void Cell::on_scanner(const hal::ScannerEvent& event) {
+  using Kind = hal::ScannerEvent::Kind;
+  switch (event.kind) {
+    case Kind::ready:
+      record("scanner", "ready", "", "");
+      if (state_ == CellState::held && cause_ == HoldCause::scanner) apply(CellEvent::unhold);
+      break;
+    case Kind::exposed:
+      if (shot_state_ == ShotState::exposing && event.shot_id == arm_.shot_id) apply(ShotEvent::exposed);
+      break;
+    case Kind::frame: apply(ShotEvent::frame); break;
+    case Kind::shot_failed:
+      record("scanner", "shot failed", "", "", event.text);
+      give_up(event.text);
+      break;
+    case Kind::lost:
+      record("scanner", "lost", "", "", event.text);
+      hold(HoldCause::scanner, event.text);
+      break;
+  }
+}
+
+// What the state that the cell is in does by itself, one step a tick.
+void Cell::advance_state() {
+  const auto robot_rests = [this] {
+    return !settings_.devices ||
+           (robot_.state() != hal::RobotState::moving && robot_.state() != hal::RobotState::commanded);
+  };
+  switch (state_) {
+    case CellState::starting:
+      if (!settings_.devices) return apply(CellEvent::done);
+      if (start_step_ == StartStep::devices && devices_ready()) {
+        start_step_ = StartStep::calibrating;
+        if (!calibrated_) robot_.calibrate(now_);
+      }
+      if (start_step_ == StartStep::calibrating && calibrated_ && robot_.state() == hal::RobotState::ready) {
+        start_step_ = StartStep::done;
+        return apply(CellEvent::done);
+      }
+      if (start_step_ == StartStep::devices && now_ - entered_ > settings_.device_timeout) {
+        const bool scanner = scanner_.state() == hal::ScannerState::offline || scanner_.state() == hal::ScannerState::greeting;
+        abort(scanner ? hal::Message::format("scanner: {}", scanner_.why()) : hal::Message::format("robot: {}", robot_.why()));
+      }
+      return;
+    case CellState::execute:
+      advance_phase();
+      return sequence();
+    case CellState::completing: return apply(CellEvent::done);
+    case CellState::holding:
+      if (robot_rests()) apply(CellEvent::done);
+      return;
+    case CellState::held:
+      if (cause_ == HoldCause::recorder && recorder_.room_for_frame() && !recorder_.store_failed()) apply(CellEvent::unhold);
+      return;
+    case CellState::unholding:
+      if (!settings_.devices || devices_ready()) apply(CellEvent::done);
+      return;
+    case CellState::stopping:
+    case CellState::aborting:
+      // A robot that no longer answers cannot say that it rests; its own watchdog stops it after three seconds.
+      if (robot_rests() || robot_.state() == hal::RobotState::offline || now_ - entered_ > 5s) apply(CellEvent::done);
+      return;
+    case CellState::clearing:
+      if (!settings_.devices || robot_.state() == hal::RobotState::ready) apply(CellEvent::done);
+      return;
+    case CellState::resetting: return apply(CellEvent::done);
+    case CellState::idle:
+    case CellState::complete:
+    case CellState::stopped:
+    case CellState::aborted: return;
+  }
+}
+
+void Cell::start_devices() {
+  if (devices_started_) return;
+  devices_started_ = true;
+  scanner_.start(now_);
+  robot_.start(now_);
+}
+
+bool Cell::devices_ready() const {
+  const auto scanner = scanner_.state();
+  return scanner != hal::ScannerState::offline && scanner != hal::ScannerState::greeting &&
+         robot_.state() == hal::RobotState::ready;
+}
+
+// The controller's own account of its cycle: what the arm does and what the scanner does, as far as it can know.
+void Cell::account() {
+  if (!counting_) return;
+  const Duration past = now_ - last_account_;
+  last_account_ = now_;
+  cycle_.total += past;
+  if (robot_.state() == hal::RobotState::moving) return;
+  cycle_.standing += past;
+  const bool scanner_works =
+      scanner_.state() == hal::ScannerState::exposing || scanner_.state() == hal::ScannerState::computing;
+  if (!scanner_works) cycle_.idle += past;
+}
+
+void Cell::publish() {
+  CellProgress p{.state = state_, .phase = phase_, .cause = cause_, .now = now_, .why = why_};
+  p.boundary_shots = taken_[static_cast<std::size_t>(hal::ShotPurpose::seek)] +
+                     taken_[static_cast<std::size_t>(hal::ShotPurpose::boundary)];
+  p.surface_shots = taken_[static_cast<std::size_t>(hal::ShotPurpose::surface)];
+  p.surface_planned = static_cast<int>(surface_planned_);
+  p.retaken = retaken_;
+  if (phase_ == Phase::scan_surface && surface_planned_ > 0) {
+    p.part_done = static_cast<double>(p.surface_shots) / static_cast<double>(surface_planned_);
+    // A shot takes as long as those before it did on average; the boundary's shots take about as long.
+    const int taken = p.boundary_shots + p.surface_shots;
+    if (taken > 0) p.time_left = (now_ - started_) / taken * (p.surface_planned - p.surface_shots);
+  } else if (phase_ == Phase::finish_fit) {
+    p.part_done = surface_.progress();
+    p.time_left = Duration{0};
+  }
+  published_.store(p);
+}
+
+void Cell::record(std::string_view source, std::string_view event, std::string_view from, std::string_view to,
+                  const hal::Message& text) {
+  recorder_.event({.at = now_, .source = source, .event = event, .from = from, .to = to, .text = text});
+}
+
+}  // namespace moldloft::tasks

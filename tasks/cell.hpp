@@ -1,0 +1,179 @@
+// The cell: supervisor (PackML), what happens inside Execute, and one shot after another. One row of the task table.
+//
+// At most one event of each source is worked on in a tick; every transition is recorded. The machines themselves are
+// tables (cell_state.hpp, shot_sequence.hpp, boundary_tracker.hpp); this class carries their actions out.
+//
+// Thread       run() on the control thread; command() and progress() from anywhere
+// Blocking     never
+// Allocation   in the constructor only
+// Failure      what the cell can mend itself holds it until it is mended; what needs a person holds it for a person;
+//              what is dangerous aborts it. why() says which and what to do, in one line
+#pragma once
+
+#include <atomic>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "hal/recorder.hpp"
+#include "hal/robot.hpp"
+#include "hal/scanner.hpp"
+#include "tasks/boundary_tracker.hpp"
+#include "tasks/cell_state.hpp"
+#include "tasks/latest.hpp"
+#include "tasks/motion_guard.hpp"
+#include "tasks/scan_plan.hpp"
+#include "tasks/scheduler.hpp"
+#include "tasks/shot_archive.hpp"
+#include "tasks/shot_sequence.hpp"
+#include "tasks/surface_task.hpp"
+
+namespace moldloft::tasks {
+
+struct CellSettings {
+  geometry::RigidMotion tip_from_scanner = geometry::RigidMotion::Identity();
+  ShotPlace start;
+  int speed_percent = 100;
+  Workspace workspace;
+  TrackerSettings tracker;
+  ScanPlanSettings scan;
+  ShotViewSettings view;
+  std::size_t max_stripes = 128, max_points = 65536;  // of a frame
+  std::size_t max_surface_shots = 64;
+  int max_attempts = 3;              // of one shot, before the cell holds
+  Duration device_timeout = 10s;     // for scanner and robot to become ready at the start
+  std::uint32_t epoch = 1;           // of this run's shot ids (shot_archive.hpp)
+  bool devices = true;               // false: only archived shots, nothing moves
+};
+
+enum class HoldCause : std::uint8_t { none, scanner, recorder, person };
+
+struct CellProgress {  // for people; trivially copyable
+  CellState state = CellState::idle;
+  Phase phase = Phase::none;
+  HoldCause cause = HoldCause::none;
+  int boundary_shots = 0, surface_shots = 0, surface_planned = 0, retaken = 0;
+  double part_done = 0;  // of the phase, 0..1
+  Instant now{0};
+  Duration time_left{-1};  // negative: not known yet
+  hal::Message why;
+};
+
+struct CycleTimes {  // over the whole run, from start to the end of Execute
+  Duration total{0}, standing{0}, idle{0};
+};
+
+class Cell final : public Task {
+ public:
+  Cell(const CellSettings&, Clock&, hal::Scanner&, hal::Robot&, hal::Recorder&, SurfaceTask&,
+       const ShotArchive* archive = nullptr);
+
+  void run(Instant now) override;
+
+  void command(CellEvent);  // an operator's or line controller's command, taken up in the next tick
+  CellProgress progress() const { return published_.load(); }
+  CellState state() const { return state_; }
+  Phase phase() const { return phase_; }
+  HoldCause cause() const { return cause_; }
+  const hal::Message& why() const { return why_; }
+
+  // ---- results, for reading when the cell has come to rest
+  const BoundaryTracker& tracker() const { return tracker_; }
+  std::span<const ShotPlace> boundary_places() const { return boundary_places_; }
+  std::span<const ShotPlace> surface_places() const { return {surface_places_.data(), surface_planned_}; }
+  int shots_taken(hal::ShotPurpose purpose) const { return taken_[static_cast<std::size_t>(purpose)]; }
+  int shots_retaken() const { return retaken_; }
+  std::uint64_t points_seen() const { return points_seen_; }
+  const CycleTimes& cycle() const { return cycle_; }
+  Duration surface_after_last_frame() const { return surface_ready_ - last_frame_; }
+  const Histogram& frame_to_command() const { return frame_to_command_; }  // last byte of a frame in, command given out
+  std::size_t view_bytes() const { return view_.bytes(); }
+  std::size_t plan_bytes() const;
+
+ private:
+  struct Order {
+    std::uint32_t number = 0, shot_id = 0;
+    hal::ShotPurpose purpose{};
+    ShotPlace place;
+    hal::Pose commanded, reported;
+    int attempts = 0;
+    bool turned_half = false;  // the other of the two yaws that look the same has been tried
+  };
+  enum class StartStep : std::uint8_t { devices, calibrating, done };
+
+  // cell.cpp: the supervisor
+  void apply(CellEvent, const hal::Message& text = {});
+  void enter(CellAction);
+  void hold(HoldCause, const hal::Message&);
+  void abort(const hal::Message&);
+  void on_robot(const hal::RobotEvent&);
+  void on_scanner(const hal::ScannerEvent&);
+  void advance_state();
+  void start_devices();
+  bool devices_ready() const;
+  void account();
+  void publish();
+  void record(std::string_view source, std::string_view event, std::string_view from, std::string_view to,
+              const hal::Message& text = {});
+
+  // cell_shots.cpp: one shot after another
+  void want(const ShotPlace&, hal::ShotPurpose);
+  void sequence();
+  void apply(ShotEvent);
+  void carry_out(ShotAction);
+  void drive();
+  bool pick_pose(Order&);
+  void trigger();
+  void deliver();
+  void give_up(const hal::Message&);
+  bool deliver_archived();
+  bool may_expose() const;
+  Eigen::Vector3d hint_in_world(const Order&) const;
+
+  // cell_phases.cpp: what happens inside Execute
+  void set_phase(Phase);
+  void measure();
+  void advance_phase();
+  void use_shot(const Order&, const hal::Frame&);
+  void use_boundary_shot(const Order&, const geometry::RigidMotion& world_from_scanner);
+  void plan_surface();
+  void next_surface_shot();
+
+  CellSettings settings_;
+  Clock& clock_;
+  hal::Scanner& scanner_;
+  hal::Robot& robot_;
+  hal::Recorder& recorder_;
+  SurfaceTask& surface_;
+  const ShotArchive* archive_;
+
+  Instant now_{0}, entered_{0}, started_{0}, last_account_{0}, last_frame_{0}, surface_ready_{0};
+  std::atomic<int> commands_{0};  // a bit for each CellEvent
+  CellState state_ = CellState::idle;
+  Phase phase_ = Phase::none;
+  HoldCause cause_ = HoldCause::none;
+  hal::Message why_;
+  StartStep start_step_ = StartStep::devices;
+  bool devices_started_ = false, calibrated_ = false;
+  bool counting_ = false;
+
+  ShotState shot_state_ = ShotState::parked;
+  std::optional<Order> wanted_;
+  Order arm_, exposed_;
+  hal::Pose standing_;
+  std::uint32_t last_number_ = 0, epoch_ = 0;
+
+  BoundaryTracker tracker_;
+  ShotView view_;
+  HeightModel heights_;
+  std::vector<ShotPlace> boundary_places_, surface_places_;
+  std::size_t surface_planned_ = 0, surface_next_ = 0;
+  std::array<int, 3> taken_{};
+  int retaken_ = 0;
+  std::uint64_t points_seen_ = 0;
+  CycleTimes cycle_;
+  Histogram frame_to_command_;
+  Latest<CellProgress> published_;
+};
+
+}  // namespace moldloft::tasks

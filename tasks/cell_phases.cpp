@@ -1,0 +1,140 @@
+// What happens inside Execute: seek the edge, track the boundary, plan, scan, finish the fit.
+#include "tasks/cell.hpp"
+#include "tasks/tool_pose.hpp"
+
+namespace moldloft::tasks {
+
+using hal::ShotPurpose;
+using Stage = SurfaceTask::Stage;
+
+namespace {
+
+// Plate points that go into the rough height model: a few of each shot are plenty for six coefficients.
+constexpr std::uint32_t height_stride = 20;
+
+// How far inside the outline the hint of a surface shot lies, when the field's centre is outside.
+constexpr double hint_inside_mm = 10;
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+bool inside_quad(const std::array<Eigen::Vector2d, 4>& corners, const Eigen::Vector2d& p) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (cross(corners[(i + 1) % 4] - corners[i], p - corners[i]) < 0) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+void Cell::set_phase(Phase phase) {
+  if (phase == phase_) return;
+  record("phase", "", to_string(phase_), to_string(phase));
+  phase_ = phase;
+}
+
+void Cell::measure() {
+  set_phase(Phase::seek_edge);
+  boundary_places_.clear();
+  surface_planned_ = surface_next_ = 0;
+  heights_.reset();
+  surface_.begin();
+  tracker_.begin(settings_.start);
+  want(settings_.start, ShotPurpose::seek);
+}
+
+// Looks at what the background work has come to.
+void Cell::advance_phase() {
+  if (surface_.stage() == Stage::failed && phase_ != Phase::none) {
+    const auto reason = geometry::to_string(surface_.error());
+    return hold(HoldCause::person,
+                hal::Message::format("{}: {}; everything is stored, 'moldloft fit' can go on from it", to_string(phase_), reason));
+  }
+  switch (phase_) {
+    case Phase::plan_scan:
+      if (surface_.outline_ready()) plan_surface();
+      return;
+    case Phase::scan_surface:
+      if (surface_next_ == surface_planned_ && !wanted_ && shot_state_ == ShotState::parked && surface_.stage() == Stage::open) {
+        surface_.solve();
+        set_phase(Phase::finish_fit);
+      }
+      return;
+    case Phase::finish_fit:
+      if (surface_.stage() != Stage::ready) return;
+      surface_ready_ = now_;
+      set_phase(Phase::none);
+      return apply(CellEvent::done);
+    default: return;
+  }
+}
+
+void Cell::use_shot(const Order& order, const hal::Frame& frame) {
+  ++taken_[static_cast<std::size_t>(order.purpose)];
+  points_seen_ += frame.point_count;
+  const geometry::RigidMotion world_from_scanner = motion_of(order.reported) * settings_.tip_from_scanner;
+  const Eigen::Vector3d hint = world_from_scanner.inverse() * hint_in_world(order);
+  const bool found = view_.look(frame, hint);
+  if (order.purpose == ShotPurpose::surface) {
+    if (found) surface_.fold(view_, world_from_scanner);
+    return;
+  }
+  boundary_places_.push_back(order.place);
+  if (found) {
+    view_.rewind(height_stride);
+    std::array<Eigen::Vector3d, 64> points;
+    for (std::size_t n = view_.next(points); n > 0; n = view_.next(points)) {
+      for (std::size_t i = 0; i < n; ++i) heights_.add(world_from_scanner * points[i]);
+    }
+    surface_.keep(view_, world_from_scanner);
+  }
+  use_boundary_shot(order, world_from_scanner);
+}
+
+Eigen::Vector3d Cell::hint_in_world(const Order& order) const {
+  if (order.purpose != ShotPurpose::surface) return tracker_.plate_hint();
+  const auto& corners = surface_.outline().corners;
+  const Eigen::Vector2d middle = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;
+  Eigen::Vector2d p = order.place.centre.head<2>();
+  if (!inside_quad(corners, p)) {
+    const Eigen::Vector2d inwards = (middle - p).normalized();
+    while (!inside_quad(corners, p) && (middle - p).norm() > 1) p += inwards;
+    p += hint_inside_mm * inwards;
+  }
+  return {p.x(), p.y(), heights_.at(p.x(), p.y())};
+}
+
+void Cell::use_boundary_shot(const Order& order, const geometry::RigidMotion& world_from_scanner) {
+  const auto step = tracker_.take({.world_from_scanner = world_from_scanner,
+                                   .plate_found = !view_.runs().empty(),
+                                   .view = view_.boundary()});
+  record("tracker", to_string(step.event), to_string(step.from), to_string(step.to),
+         hal::Message::format("shot {}: {}", order.number, to_string(step.action)));
+  switch (step.to) {
+    case TrackState::failed: return hold(HoldCause::person, step.text);
+    case TrackState::closed:
+      set_phase(Phase::plan_scan);
+      heights_.solve();
+      return surface_.build_outline(tracker_.edge_points(), tracker_.corners());
+    case TrackState::seek_edge: break;
+    default: set_phase(Phase::track_boundary); break;
+  }
+  if (step.next) want(*step.next, step.to == TrackState::seek_edge ? ShotPurpose::seek : ShotPurpose::boundary);
+}
+
+void Cell::plan_surface() {
+  const auto& last = boundary_places_.back();
+  const auto planned = plan_zigzag(surface_.outline(), heights_, settings_.scan, last.centre.head<2>(), last.head_yaw, surface_places_);
+  if (!planned) {
+    return hold(HoldCause::person, "the plate needs more shots than [plate] largest_mm plans for: raise it and run again");
+  }
+  surface_planned_ = *planned;
+  surface_next_ = 0;
+  set_phase(Phase::scan_surface);
+  next_surface_shot();
+}
+
+void Cell::next_surface_shot() {
+  if (surface_next_ < surface_planned_) want(surface_places_[surface_next_++], ShotPurpose::surface);
+}
+
+}  // namespace moldloft::tasks

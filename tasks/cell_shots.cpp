@@ -1,0 +1,164 @@
+// One shot after another: drive, expose, deliver; and the same from the archive.
+#include <cmath>
+#include <numbers>
+
+#include "tasks/cell.hpp"
+#include "tasks/tool_pose.hpp"
+
+namespace moldloft::tasks {
+
+using hal::ShotPurpose;
+
+void Cell::want(const ShotPlace& place, ShotPurpose purpose) {
+  Order order;
+  order.number = ++last_number_;
+  order.purpose = purpose;
+  order.place = place;
+  wanted_ = order;
+}
+
+// Hands the next wanted shot to the arm, and lets the scanner expose when everything is ready for the frame.
+void Cell::sequence() {
+  if (wanted_ && (shot_state_ == ShotState::parked || shot_state_ == ShotState::computing)) {
+    if (deliver_archived()) return;
+    if (!settings_.devices) {
+      return hold(HoldCause::person, hal::Message::format("the recording ends before shot {}: resume the run on the cell to go on",
+                                                          wanted_->number));
+    }
+    if (robot_.state() == hal::RobotState::ready) apply(ShotEvent::order);
+  }
+  if (shot_state_ == ShotState::in_place && may_expose()) apply(ShotEvent::clear);
+  if (shot_state_ == ShotState::in_place && recorder_.store_failed()) hold(HoldCause::recorder, recorder_.store_error());
+}
+
+bool Cell::may_expose() const {
+  const auto stage = surface_.stage();
+  const bool fit_has_room = stage != SurfaceTask::Stage::folding && stage != SurfaceTask::Stage::folding_reserve;
+  return fit_has_room && scanner_.state() == hal::ScannerState::ready && recorder_.room_for_frame() &&
+         !recorder_.store_failed();
+}
+
+void Cell::apply(ShotEvent event) {
+  const auto* row = find_transition(shot_transitions(), shot_state_, event, ShotContext{});
+  if (row == nullptr) return;
+  record("shot", to_string(event), to_string(shot_state_), to_string(row->to));
+  shot_state_ = row->to;
+  carry_out(row->action);
+}
+
+void Cell::carry_out(ShotAction action) {
+  switch (action) {
+    case ShotAction::drive: return drive();
+    case ShotAction::note_pose: arm_.reported = standing_; return;
+    case ShotAction::trigger: return trigger();
+    case ShotAction::release_arm:
+      exposed_ = arm_;
+      if (phase_ == Phase::scan_surface) next_surface_shot();
+      return;
+    case ShotAction::release_and_deliver:
+      exposed_ = arm_;
+      if (phase_ == Phase::scan_surface) next_surface_shot();
+      return deliver();
+    case ShotAction::deliver: return deliver();
+    case ShotAction::give_up:
+    case ShotAction::none: return;
+  }
+}
+
+void Cell::drive() {
+  arm_ = *wanted_;
+  wanted_.reset();
+  arm_.shot_id = (epoch_ << shot_number_bits) | arm_.number;
+  if (!pick_pose(arm_)) return;
+  if (!robot_.move(arm_.commanded, settings_.speed_percent, now_)) {
+    return abort("robot takes no target although it said it was ready: check it and clear");
+  }
+  if (last_frame_ > Instant{0} && (arm_.purpose != ShotPurpose::surface)) {
+    frame_to_command_.add(clock_.now() - last_frame_);
+  }
+}
+
+// Two yaws half a turn apart look the same; the one that the workspace allows and that turns the head less is taken.
+bool Cell::pick_pose(Order& order) {
+  std::optional<hal::Message> no;
+  double least_turn = INFINITY;
+  const ShotPlace wanted = order.place;
+  for (const double half_turn : {0.0, std::numbers::pi}) {
+    ShotPlace place = wanted;
+    place.head_yaw = geometry::wrapped_angle(wanted.head_yaw + half_turn);
+    const hal::Pose pose = tip_pose_for(place, settings_.tip_from_scanner);
+    if (auto refused = refuse_target(pose, standing_, settings_.speed_percent, settings_.workspace)) {
+      if (!no) no = refused;
+      order.turned_half = true;  // only one of the two is left
+      continue;
+    }
+    const double turn = std::abs(geometry::wrapped_angle((pose.roll - pose.yaw) - (standing_.roll - standing_.yaw)));
+    if (turn >= least_turn) continue;
+    least_turn = turn;
+    order.place = place;
+    order.commanded = pose;
+  }
+  if (std::isinf(least_turn)) abort(*no);
+  return !std::isinf(least_turn);
+}
+
+void Cell::trigger() {
+  if (++arm_.attempts > 1) ++retaken_;
+  scanner_.trigger(arm_.shot_id, now_);
+}
+
+// The driver has given a shot up. Where the arm still stands it is taken again; where it has gone on, the place is
+// visited once more at the end (surface) or at once (boundary: nothing else is known to do).
+void Cell::give_up(const hal::Message& text) {
+  Order& order = shot_state_ == ShotState::exposing ? arm_ : exposed_;
+  if (order.attempts >= settings_.max_attempts) {
+    apply(ShotEvent::failed);
+    return hold(HoldCause::person, text);
+  }
+  const bool arm_has_gone = shot_state_ != ShotState::exposing;
+  const Order again = order;
+  apply(ShotEvent::failed);
+  if (!arm_has_gone) return;
+  if (again.purpose == ShotPurpose::surface && surface_planned_ < surface_places_.size()) {
+    surface_places_[surface_planned_++] = again.place;
+    ++retaken_;
+    if (!wanted_ && shot_state_ == ShotState::parked) next_surface_shot();
+  } else {
+    // A new id: the arm may have moved, and the scanner must not answer with what it exposed elsewhere.
+    ++epoch_;
+    wanted_ = again;
+  }
+}
+
+void Cell::deliver() {
+  const auto& frame = scanner_.frame();
+  last_frame_ = frame.arrived;
+  recorder_.shot({.at = frame.arrived,
+                  .shot_id = exposed_.shot_id,
+                  .purpose = exposed_.purpose,
+                  .attempts = static_cast<std::uint16_t>(exposed_.attempts),
+                  .commanded = exposed_.commanded,
+                  .reported = exposed_.reported,
+                  .payload_offset = scanner_.frame_offset(),
+                  .payload_bytes = scanner_.frame_bytes()});
+  use_shot(exposed_, frame);
+}
+
+bool Cell::deliver_archived() {
+  const ArchivedShot* shot = archive_ == nullptr ? nullptr : archive_->find(wanted_->number);
+  if (shot == nullptr) return false;
+  const auto stage = surface_.stage();
+  if (stage == SurfaceTask::Stage::folding || stage == SurfaceTask::Stage::folding_reserve) return true;  // later
+  exposed_ = *wanted_;
+  wanted_.reset();
+  exposed_.shot_id = shot->record.shot_id;
+  exposed_.commanded = shot->record.commanded;
+  exposed_.reported = shot->record.reported;
+  record("shot", "archived", "", "");
+  if (phase_ == Phase::scan_surface) next_surface_shot();
+  last_frame_ = now_;
+  use_shot(exposed_, *shot->frame);
+  return true;
+}
+
+}  // namespace moldloft::tasks

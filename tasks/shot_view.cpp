@@ -1,0 +1,67 @@
+#include "tasks/shot_view.hpp"
+
+#include <cmath>
+
+namespace moldloft::tasks {
+
+using geometry::PlateRun;
+
+namespace {
+constexpr std::size_t max_runs_per_stripe = 8;  // a plate with more holes than that on one line is not a plate
+}
+
+ShotView::ShotView(std::size_t max_stripes, std::size_t max_points, const ShotViewSettings& settings)
+    : settings_{settings}, finder_{max_stripes, max_points}, viewer_{max_stripes * max_runs_per_stripe} {
+  stripes_.reserve(max_stripes);
+}
+
+std::size_t ShotView::bytes() const {
+  return finder_.bytes() + viewer_.bytes() + stripes_.capacity() * sizeof(geometry::StripeView);
+}
+
+bool ShotView::look(const hal::Frame& frame, const Eigen::Vector3d& hint) {
+  frame_ = &frame;
+  stripes_.clear();
+  for (const auto& line : frame.lines()) {
+    const auto column = [&](const std::vector<float>& c) { return std::span{c}.subspan(line.first, line.count); };
+    stripes_.push_back({column(frame.x), column(frame.y), column(frame.z)});
+  }
+  const auto found = finder_.find(stripes_, hint, settings_.runs);
+  runs_ = found ? *found : std::span<const PlateRun>{};
+  boundary_ = found ? viewer_.look(runs_, stripes_.size(), settings_.boundary) : geometry::BoundaryViewer::View{};
+  rewind(1);
+  return found.has_value();
+}
+
+void ShotView::rewind(std::uint32_t stride) {
+  stride_ = stride;
+  run_ = 0;
+  point_ = runs_.empty() ? 0 : runs_.front().first;
+}
+
+bool ShotView::within_margins(const PlateRun& run, std::uint32_t point) const {
+  const auto& stripe = stripes_[run.stripe];
+  const double y = stripe.y[point];
+  if (is_edge(run.at_first) && y - run.edge_first.y() < settings_.edge_margin_mm) return false;
+  if (is_edge(run.at_last) && run.edge_last.y() - y < settings_.edge_margin_mm) return false;
+  return true;
+}
+
+std::size_t ShotView::next(std::span<Eigen::Vector3d> out) {
+  std::size_t count = 0;
+  while (count < out.size() && run_ < runs_.size()) {
+    const PlateRun& run = runs_[run_];
+    if (point_ > run.last || run.stripe % stride_ != 0) {
+      if (++run_ < runs_.size()) point_ = runs_[run_].first;
+      continue;
+    }
+    const auto& stripe = stripes_[run.stripe];
+    if (std::isfinite(stripe.z[point_]) && within_margins(run, point_)) {
+      out[count++] = {stripe.x[point_], stripe.y[point_], stripe.z[point_]};
+    }
+    point_ += stride_;
+  }
+  return count;
+}
+
+}  // namespace moldloft::tasks

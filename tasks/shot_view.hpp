@@ -1,0 +1,54 @@
+// From a frame to what the cell makes of it: the plate's runs, the boundary's pieces, the points that lie on the plate.
+//
+// Frame        scanner coordinates in, scanner coordinates out; the caller registers with the shot's pose
+// Cost         about 0.2 ms for 100 stripes of 500 points
+// Allocation   in the constructor only
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "geometry/boundary_view.hpp"
+#include "geometry/plate_runs.hpp"
+#include "hal/frame.hpp"
+
+namespace moldloft::tasks {
+
+struct ShotViewSettings {
+  geometry::PlateRunSettings runs;
+  geometry::BoundaryViewSettings boundary;
+  double edge_margin_mm = 1.5;  // points nearer than this to an edge, along the stripe, stay out of the surface
+};
+
+class ShotView {
+ public:
+  ShotView(std::size_t max_stripes, std::size_t max_points, const ShotViewSettings&);
+
+  // Looks at a frame; `hint` is a point on or near the plate. False when nothing of the plate is there.
+  bool look(const hal::Frame& frame, const Eigen::Vector3d& hint);
+
+  const geometry::BoundaryViewer::View& boundary() const { return boundary_; }
+  std::span<const geometry::PlateRun> runs() const { return runs_; }
+
+  // Walks through the good points on the plate, away from its edges. next() fills `out` with as many as fit and returns
+  // how many; 0 when all have been given. Takes every `stride`-th stripe and point.
+  void rewind(std::uint32_t stride);
+  std::size_t next(std::span<Eigen::Vector3d> out);
+
+  std::size_t bytes() const;
+
+ private:
+  bool within_margins(const geometry::PlateRun&, std::uint32_t point) const;
+
+  ShotViewSettings settings_;
+  geometry::PlateRunFinder finder_;
+  geometry::BoundaryViewer viewer_;
+  std::vector<geometry::StripeView> stripes_;
+  std::span<const geometry::PlateRun> runs_;
+  geometry::BoundaryViewer::View boundary_;
+  const hal::Frame* frame_ = nullptr;
+  std::size_t run_ = 0;         // where the walk stands
+  std::uint32_t point_ = 0, stride_ = 1;
+};
+
+}  // namespace moldloft::tasks

@@ -1,0 +1,115 @@
+#include "tasks/surface_task.hpp"
+
+#include <algorithm>
+
+namespace moldloft::tasks {
+
+SurfaceTask::SurfaceTask(const SurfaceTaskSettings& settings)
+    : settings_{settings}, outline_{settings.max_edge_points, settings.outline}, fit_{settings.fit} {
+  reserve_.reserve(settings.max_boundary_shots * settings.reserve_points_per_shot);
+  reserve_ends_.reserve(settings.max_boundary_shots);
+}
+
+void SurfaceTask::begin() {
+  stage_ = Stage::idle;
+  reserve_.clear();
+  reserve_ends_.clear();
+  reserve_next_ = reserve_shot_ = 0;
+  shots_ = 0;
+}
+
+void SurfaceTask::keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner) {
+  if (reserve_ends_.size() == reserve_ends_.capacity()) return;  // the tracker gives up before this
+  shot.rewind(settings_.reserve_stride);
+  std::size_t room = std::min(settings_.reserve_points_per_shot, reserve_.capacity() - reserve_.size());
+  while (room > 0) {
+    const std::size_t count = shot.next(std::span{chunk_}.first(std::min(room, chunk_.size())));
+    if (count == 0) break;
+    for (std::size_t i = 0; i < count; ++i) reserve_.push_back(world_from_scanner * chunk_[i]);
+    room -= count;
+  }
+  reserve_ends_.push_back(reserve_.size());
+}
+
+void SurfaceTask::build_outline(std::span<const Eigen::Vector2d> edges, std::span<const Eigen::Vector2d> corner_hints) {
+  stage_ = Stage::building_outline;
+  if (const auto begun = outline_.begin(edges, corner_hints); !begun) fail(begun.error());
+}
+
+void SurfaceTask::fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner) {
+  shot.rewind(1);
+  shot_ = &shot;
+  world_from_scanner_ = world_from_scanner;
+  stage_ = Stage::folding;
+}
+
+void SurfaceTask::solve() {
+  fit_.start_solving();
+  stage_ = Stage::solving;
+}
+
+bool SurfaceTask::has_work() const {
+  return stage_ == Stage::building_outline || stage_ == Stage::folding_reserve || stage_ == Stage::folding ||
+         stage_ == Stage::solving;
+}
+
+void SurfaceTask::step(Instant) {
+  switch (stage_) {
+    case Stage::building_outline: return step_outline();
+    case Stage::folding_reserve: return step_reserve();
+    case Stage::folding: return step_fold();
+    case Stage::solving: return step_solve();
+    default: return;
+  }
+}
+
+void SurfaceTask::fail(geometry::Error error) {
+  error_ = error;
+  stage_ = Stage::failed;
+}
+
+void SurfaceTask::step_outline() {
+  const auto done = outline_.step();
+  if (!done) return fail(done.error());
+  if (!*done) return;
+  map_.assign(outline_.outline());
+  if (const auto good = map_.check(); !good) return fail(good.error());
+  fit_.begin(map_);
+  stage_ = Stage::folding_reserve;
+}
+
+void SurfaceTask::step_reserve() {
+  if (reserve_shot_ == reserve_ends_.size()) {
+    shots_ = static_cast<int>(reserve_shot_);
+    stage_ = Stage::open;
+    return;
+  }
+  const std::size_t end = reserve_ends_[reserve_shot_];
+  const std::size_t count = std::min(end - reserve_next_, chunk_points);
+  if (count > 0) {
+    const auto added = fit_.add(std::span{reserve_}.subspan(reserve_next_, count), 1.0, static_cast<int>(reserve_shot_));
+    if (!added) return fail(added.error());
+  }
+  reserve_next_ += count;
+  if (reserve_next_ == end) ++reserve_shot_;
+}
+
+void SurfaceTask::step_fold() {
+  const std::size_t count = shot_->next(chunk_);
+  if (count == 0) {
+    ++shots_;
+    stage_ = Stage::open;
+    return;
+  }
+  const auto points = std::span{chunk_}.first(count);
+  for (auto& p : points) p = world_from_scanner_ * p;
+  if (const auto added = fit_.add(points, 1.0, shots_); !added) fail(added.error());
+}
+
+void SurfaceTask::step_solve() {
+  const auto done = fit_.step();
+  if (!done) return fail(done.error());
+  if (*done) stage_ = Stage::ready;
+}
+
+}  // namespace moldloft::tasks

@@ -1,0 +1,100 @@
+// The geometry that runs in the slack of the ticks: outline from the edge points, plan map, surface fit. The cell asks
+// for the next piece of work and looks now and then whether it is done.
+//
+// Boundary shots come before the outline is known, so their points cannot be folded into the fit yet: every n-th is kept
+// in a reserve of fixed size (their number hardly matters: what a shot's points have in common, the robot's error, does).
+//
+// Thread       the control thread; step() is called by the scheduler in the slack
+// Work         step() does one bounded piece: a chunk of points, one pass over a side, one slice of the solution
+// Allocation   in the constructor only
+// Failure      stage() turns failed and error() says why
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <expected>
+#include <span>
+#include <vector>
+
+#include "geometry/outline.hpp"
+#include "geometry/plan_map.hpp"
+#include "geometry/rigid_motion.hpp"
+#include "geometry/surface_fit.hpp"
+#include "tasks/scheduler.hpp"
+#include "tasks/shot_view.hpp"
+
+namespace moldloft::tasks {
+
+struct SurfaceTaskSettings {
+  geometry::OutlineSettings outline;
+  geometry::SurfaceFitSettings fit;
+  std::size_t max_edge_points = 24000;
+  std::size_t max_boundary_shots = 96;
+  std::size_t reserve_points_per_shot = 3200;  // 50,000 points thinned by 4 x 4
+  std::uint32_t reserve_stride = 4;
+};
+
+class SurfaceTask final : public BackgroundTask {
+ public:
+  enum class Stage : std::uint8_t {
+    idle,
+    building_outline,
+    folding_reserve,  // the outline is ready; shots of the surface may be planned
+    open,             // takes the next shot
+    folding,          // a shot's points; the frame must stay as it is
+    solving,
+    ready,
+    failed,
+  };
+
+  explicit SurfaceTask(const SurfaceTaskSettings&);
+
+  void begin();
+  // Keeps a thinned copy of the plate's points of a boundary shot. At once: 3,000 points take about 50 us.
+  void keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner);
+  void build_outline(std::span<const Eigen::Vector2d> edges, std::span<const Eigen::Vector2d> corner_hints);
+  // Folds a surface shot in; `shot` and its frame stay untouched by others until stage() is open again.
+  void fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner);
+  void solve();
+
+  bool has_work() const override;
+  void step(Instant deadline) override;
+
+  Stage stage() const { return stage_; }
+  bool outline_ready() const { return stage_ >= Stage::folding_reserve && stage_ != Stage::failed; }
+  geometry::Error error() const { return error_; }
+  const geometry::Outline& outline() const { return outline_.outline(); }
+  const geometry::SurfaceFit& fit() const { return fit_; }
+  int shots() const { return shots_; }
+  double progress() const { return fit_.progress(); }
+
+  std::size_t outline_bytes() const { return outline_.bytes(); }
+  std::size_t fit_bytes() const { return fit_.bytes(); }
+  std::size_t reserve_bytes() const { return reserve_.capacity() * sizeof(Eigen::Vector3d); }
+  std::size_t reserve_used_bytes() const { return reserve_.size() * sizeof(Eigen::Vector3d); }
+
+ private:
+  static constexpr std::size_t chunk_points = 512;  // at about 0.2 us a point a step stays near 100 us
+
+  void fail(geometry::Error error);
+  void step_outline();
+  void step_reserve();
+  void step_fold();
+  void step_solve();
+
+  SurfaceTaskSettings settings_;
+  geometry::OutlineBuilder outline_;
+  geometry::PlanMap map_;
+  geometry::SurfaceFit fit_;
+  std::vector<Eigen::Vector3d> reserve_;
+  std::vector<std::size_t> reserve_ends_;  // one past each boundary shot's points
+  std::array<Eigen::Vector3d, chunk_points> chunk_;
+  Stage stage_ = Stage::idle;
+  geometry::Error error_{};
+  std::size_t reserve_next_ = 0, reserve_shot_ = 0;
+  ShotView* shot_ = nullptr;
+  geometry::RigidMotion world_from_scanner_;
+  int shots_ = 0;
+};
+
+}  // namespace moldloft::tasks
