@@ -1,0 +1,157 @@
+#include "firmware_like/config.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <fstream>
+#include <numbers>
+#include <sstream>
+
+#include "firmware_like/toml_section.hpp"
+
+namespace moldloft::firmware_like {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180;
+
+geometry::RigidMotion mount_from(const std::array<double, 3>& translation_mm, const std::array<double, 3>& zyz_deg) {
+  geometry::RigidMotion mount = geometry::RigidMotion::Identity();
+  mount.linear() = geometry::rotation_from_zyz({zyz_deg[0] * degree, zyz_deg[1] * degree, zyz_deg[2] * degree});
+  mount.translation() << translation_mm[0], translation_mm[1], translation_mm[2];
+  return mount;
+}
+
+void read_scanner(TomlSection s, ScannerConfig& c) {
+  s.choice("driver", c.driver, {"psc1"});
+  s.text("host", c.host);
+  s.integer("port", c.port, 1, 65535);
+  std::string encoding = "int16";
+  s.choice("encoding", encoding, {"int16", "float32"});
+  c.encoding = encoding == "int16" ? hal::psc1::Encoding::int16 : hal::psc1::Encoding::float32;
+  s.integer("max_stripes", c.max_stripes, 1, 1000);
+  s.integer("max_points_per_stripe", c.max_points_per_stripe, 8, 4096);
+  std::array<double, 2> field{c.field_x_mm, c.field_y_mm};
+  s.numbers("field_mm", field, 5, 2000);
+  c.field_x_mm = field[0];
+  c.field_y_mm = field[1];
+  s.number("noise_mm", c.noise_mm, 1e-4, 5);
+  TomlSection mount = s.section("mount");
+  std::array<double, 3> translation{0, 140, 300}, zyz{0, 180, 180};
+  mount.numbers("translation_mm", translation, -2000, 2000);
+  mount.numbers("zyz_deg", zyz, -360, 360);
+  mount.finish();
+  c.tip_from_scanner = mount_from(translation, zyz);
+  s.finish();
+}
+
+void read_range(TomlSection& s, std::string_view key, tasks::Range& range) {
+  std::array<double, 2> v{range.min, range.max};
+  s.numbers(key, v, -1e5, 1e9);
+  range = {v[0], v[1]};
+}
+
+void read_robot(TomlSection s, RobotConfig& c) {
+  s.choice("driver", c.driver, {"line"});
+  s.text("device", c.device);
+  s.integer("baud", c.baud, 1200, 921600);
+  s.integer("speed_percent", c.speed_percent, 1, 100);
+  s.number("repeatability_z_mm", c.repeatability_z_mm, 0, 10);
+  TomlSection w = s.section("workspace");
+  read_range(w, "x_mm", c.workspace.x_mm);
+  read_range(w, "y_mm", c.workspace.y_mm);
+  read_range(w, "z_mm", c.workspace.z_mm);
+  read_range(w, "reach_mm", c.workspace.reach_mm);
+  w.number("max_step_mm", c.workspace.max_step_mm, 1, 1e5);
+  w.integer("max_speed_percent", c.workspace.max_speed_percent, 1, 100);
+  w.finish();
+  s.finish();
+}
+
+void read_rest(TomlSection& file, CellConfig& c) {
+  TomlSection cell = file.section("cell");
+  cell.text("name", c.name);
+  int tick_us = static_cast<int>(c.tick.count() / 1000);
+  cell.integer("tick_us", tick_us, 100, 100000);
+  c.tick = std::chrono::microseconds{tick_us};
+  double timeout_s = std::chrono::duration<double>(c.device_timeout).count();
+  cell.number("device_timeout_s", timeout_s, 0.1, 3600);
+  c.device_timeout = std::chrono::duration_cast<hal::Duration>(std::chrono::duration<double>(timeout_s));
+  cell.finish();
+
+  TomlSection plate = file.section("plate");
+  plate.number("thickness_mm", c.plate.thickness_mm, 0.5, 200);
+  std::array<double, 2> largest{c.plate.largest_x_mm, c.plate.largest_y_mm};
+  plate.numbers("largest_mm", largest, 50, 10000);
+  c.plate.largest_x_mm = largest[0];
+  c.plate.largest_y_mm = largest[1];
+  plate.finish();
+
+  TomlSection start = file.section("start");
+  std::array<double, 3> centre{c.start.centre.x(), c.start.centre.y(), c.start.centre.z()};
+  start.numbers("centre_mm", centre, -1e5, 1e5);
+  c.start.centre << centre[0], centre[1], centre[2];
+  double yaw_deg = c.start.head_yaw / degree;
+  start.number("yaw_deg", yaw_deg, -360, 360);
+  c.start.head_yaw = yaw_deg * degree;
+  start.finish();
+
+  TomlSection tracking = file.section("tracking");
+  tracking.number("overlap_mm", c.tracking_overlap_mm, 2, 500);
+  tracking.number("crossing_deg", c.tracking_crossing_deg, 30, 90);
+  tracking.number("seek_step_mm", c.seek_step_mm, 5, 1000);
+  tracking.number("seek_limit_mm", c.seek_limit_mm, 5, 1e5);
+  tracking.finish();
+
+  TomlSection scan = file.section("scan");
+  scan.number("overlap_mm", c.scan_overlap_mm, 0, 500);
+  scan.number("margin_mm", c.scan_margin_mm, 0, 100);
+  scan.finish();
+
+  TomlSection fit = file.section("fit");
+  fit.number("finest_span_mm", c.finest_span_mm, 1, 500);
+  fit.finish();
+}
+
+}  // namespace
+
+CellConfig default_config() {
+  CellConfig c;
+  c.scanner.tip_from_scanner = mount_from({0, 140, 300}, {0, 180, 180});
+  c.start.centre << 500, 0, 10;
+  return c;
+}
+
+std::expected<CellConfig, ConfigError> parse_config(const std::string& text, const std::string& path) {
+  CellConfig config = default_config();
+  config.path = path;
+  config.text = text;
+  std::optional<std::string> error;
+  try {
+    const toml::table table = toml::parse(text, path);
+    TomlSection file{&table, "", path, error};
+    int schema = 1;
+    file.integer("schema", schema, 1, 1);
+    read_scanner(file.section("scanner"), config.scanner);
+    read_robot(file.section("robot"), config.robot);
+    read_rest(file, config);
+    file.finish();
+  } catch (const toml::parse_error& e) {
+    error = fmt::format("{}:{}: {}", path, e.source().begin.line, e.description());
+  }
+  if (!error && 2 * config.scan_overlap_mm > std::min(config.scanner.field_x_mm, config.scanner.field_y_mm)) {
+    error = fmt::format("{}: [scan] overlap_mm {} is more than half of [scanner] field_mm", path, config.scan_overlap_mm);
+  }
+  if (error) return std::unexpected{ConfigError{*error}};
+  return config;
+}
+
+std::expected<CellConfig, ConfigError> load_config(const std::string& path) {
+  std::ifstream file{path};
+  std::ostringstream text;
+  if (!file || !(text << file.rdbuf())) {
+    return std::unexpected{ConfigError{fmt::format("{}: cannot be read; give the path of a cell configuration", path)}};
+  }
+  return parse_config(text.str(), path);
+}
+
+}  // namespace moldloft::firmware_like

@@ -1,0 +1,67 @@
+// The cell's configuration: one TOML file a cell, every key explained in cell.example.toml beside this file.
+//
+// Strict on purpose: an unknown key, a wrong type or an impossible value is one line with file, line, key and what is
+// allowed, because a misspelt limit that silently keeps its default is how arms meet plates.
+#pragma once
+
+#include <expected>
+#include <string>
+
+#include "hal/psc1.hpp"
+#include "tasks/cell.hpp"
+
+namespace moldloft::firmware_like {
+
+struct ConfigError {
+  std::string what;  // "cell.toml:12: [robot] baud: ..."
+};
+
+struct ScannerConfig {
+  std::string driver = "psc1";
+  std::string host = "127.0.0.1";
+  int port = hal::psc1::default_port;
+  hal::psc1::Encoding encoding = hal::psc1::Encoding::int16;
+  int max_stripes = 100;
+  int max_points_per_stripe = 500;
+  double field_x_mm = 102, field_y_mm = 102;
+  double noise_mm = 0.051;
+  geometry::RigidMotion tip_from_scanner;  // the mount
+};
+
+struct RobotConfig {
+  std::string driver = "line";
+  std::string device = "/dev/ttyS0";
+  int baud = 115200;
+  int speed_percent = 100;
+  double repeatability_z_mm = 0.013;
+  tasks::Workspace workspace;
+};
+
+struct PlateConfig {
+  double thickness_mm = 6;
+  double largest_x_mm = 500, largest_y_mm = 500;  // the memory plan is made for this
+};
+
+struct CellConfig {
+  std::string path, text;  // where it came from and as it stood there; kept in the run store
+  std::string name = "cell";
+  hal::Duration tick = std::chrono::milliseconds{1};
+  hal::Duration device_timeout = std::chrono::seconds{10};
+  ScannerConfig scanner;
+  RobotConfig robot;
+  PlateConfig plate;
+  tasks::ShotPlace start;
+  double tracking_overlap_mm = 15;
+  double tracking_crossing_deg = 45;
+  double seek_step_mm = 70;
+  double seek_limit_mm = 3000;
+  double scan_overlap_mm = 10;
+  double scan_margin_mm = 2;
+  double finest_span_mm = 10;  // of the surface's net
+};
+
+CellConfig default_config();
+std::expected<CellConfig, ConfigError> load_config(const std::string& path);
+std::expected<CellConfig, ConfigError> parse_config(const std::string& text, const std::string& path);
+
+}  // namespace moldloft::firmware_like

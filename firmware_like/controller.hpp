@@ -1,0 +1,72 @@
+// The controller put together: drivers on their links, the cell, the background fit, the task table. The same object
+// runs on real devices and in simulation; only clock and links differ.
+//
+// Thread       constructed anywhere; start() and tick() on the control thread; cell().command() and progress() anywhere;
+//              recorder().drain() on one other thread (or between ticks, in virtual time)
+// Blocking     tick() sleeps until the next tick and not otherwise
+// Allocation   in the constructor and in start() (links are opened); none in tick()
+// Failure      the constructor throws nothing; what goes wrong shows in the cell's state and why()
+#pragma once
+
+#include <memory>
+
+#include "firmware_like/config.hpp"
+#include "firmware_like/memory_plan.hpp"
+#include "hal/line_robot.hpp"
+#include "hal/psc_scanner.hpp"
+#include "hal/recorder.hpp"
+#include "hal/tapped_link.hpp"
+#include "tasks/cell.hpp"
+#include "tasks/scheduler.hpp"
+
+namespace moldloft::firmware_like {
+
+struct ControllerOptions {
+  const tasks::ShotArchive* archive = nullptr;  // shots of a run that is resumed or fitted again
+  std::uint32_t epoch = 1;                      // of this run's shot ids
+  bool devices = true;                          // false: archived shots only
+};
+
+class Controller {
+ public:
+  Controller(const CellConfig&, hal::Clock&, hal::ByteLink& scanner_link, hal::ByteLink& robot_link,
+             const ControllerOptions& = {});
+
+  void start();     // commands the cell to start; the first tick is due now
+  bool tick();      // one tick; false when the cell has come to rest
+  bool at_rest() const;
+
+  const CellConfig& config() const { return config_; }
+  tasks::Cell& cell() { return cell_; }
+  const tasks::Cell& cell() const { return cell_; }
+  const tasks::SurfaceTask& surface() const { return surface_; }
+  const tasks::Scheduler& scheduler() const { return scheduler_; }
+  hal::Recorder& recorder() { return recorder_; }
+  const hal::Recorder& recorder() const { return recorder_; }
+  MemoryPlan memory() const;
+
+ private:
+  struct Row {  // of the task table: a function of the controller
+    Controller* owner;
+    void (Controller::*function)(hal::Instant);
+    void operator()(hal::Instant now) const { (owner->*function)(now); }
+  };
+  using RowTask = tasks::FunctionTask<Row>;
+  void receive_scanner(hal::Instant now) { scanner_->receive(now); }
+  void receive_robot(hal::Instant now) { robot_->receive(now); }
+  void transmit_robot(hal::Instant now) { robot_->transmit(now); }
+  void transmit_scanner(hal::Instant now) { scanner_->transmit(now); }
+  void watch_health(hal::Instant now);
+
+  CellConfig config_;
+  hal::Recorder recorder_;
+  hal::TappedLink scanner_link_, robot_link_;
+  std::unique_ptr<hal::Scanner> scanner_;
+  std::unique_ptr<hal::Robot> robot_;
+  tasks::SurfaceTask surface_;
+  tasks::Cell cell_;
+  RowTask receive_scanner_, receive_robot_, transmit_robot_, transmit_scanner_, health_;
+  tasks::Scheduler scheduler_;
+};
+
+}  // namespace moldloft::firmware_like

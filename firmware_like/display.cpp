@@ -1,0 +1,60 @@
+#include "firmware_like/display.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+
+namespace moldloft::firmware_like {
+namespace {
+
+using namespace std::chrono_literals;
+constexpr auto display_period = 100ms;
+
+}  // namespace
+
+std::string progress_line(const tasks::CellProgress& p) {
+  std::string state{tasks::to_string(p.state)};
+  if (p.phase != tasks::Phase::none) state += fmt::format(" / {}", tasks::to_string(p.phase));
+  std::string line = fmt::format("{:7.1f} s  {:<24}", std::chrono::duration<double>(p.now).count(), state);
+  line += fmt::format("  boundary shots {:>3}", p.boundary_shots);
+  if (p.surface_planned > 0) line += fmt::format("  surface {:>3}/{}", p.surface_shots, p.surface_planned);
+  if (p.retaken > 0) line += fmt::format("  retaken {}", p.retaken);
+  if (p.time_left >= hal::Duration{0}) line += fmt::format("  left {:.0f} s", std::chrono::duration<double>(p.time_left).count());
+  if (!p.why.empty()) line += fmt::format("  {}", p.why.view());
+  return line;
+}
+
+DisplayThread::DisplayThread(const tasks::Cell& cell)
+    : cell_{cell}, terminal_{isatty(STDERR_FILENO) != 0}, thread_{[this] { work(); }} {}
+
+DisplayThread::~DisplayThread() {
+  ending_ = true;
+  thread_.join();
+}
+
+void DisplayThread::work() {
+  while (!ending_) {
+    show(cell_.progress());
+    clock_.sleep_until(clock_.now() + display_period);
+  }
+  show(cell_.progress());
+  if (terminal_) std::fputc('\n', stderr);
+}
+
+void DisplayThread::show(const tasks::CellProgress& p) {
+  const std::string line = progress_line(p);
+  if (terminal_) {
+    fmt::print(stderr, "\r\x1b[K{}", line);
+    std::fflush(stderr);
+    return;
+  }
+  // Everything but the clock: a log gets a line when something has happened.
+  std::string content = line.substr(line.find('s') + 1);
+  if (const auto left = content.find("  left"); left != std::string::npos) content.resize(left);
+  if (content == last_) return;
+  last_ = content;
+  fmt::print(stderr, "{}\n", line);
+}
+
+}  // namespace moldloft::firmware_like

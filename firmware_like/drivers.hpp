@@ -1,0 +1,16 @@
+// The factory of drivers: which class answers to which `driver` in the configuration. A new make is one line here.
+#pragma once
+
+#include <memory>
+
+#include "firmware_like/config.hpp"
+#include "hal/byte_link.hpp"
+#include "hal/robot.hpp"
+#include "hal/scanner.hpp"
+
+namespace moldloft::firmware_like {
+
+std::unique_ptr<hal::Scanner> make_scanner(const ScannerConfig&, hal::ByteLink&);
+std::unique_ptr<hal::Robot> make_robot(const RobotConfig&, hal::ByteLink&);
+
+}  // namespace moldloft::firmware_like

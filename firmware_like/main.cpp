@@ -1,0 +1,31 @@
+// The controller program.
+#include <CLI/CLI.hpp>
+
+#include "firmware_like/run_command.hpp"
+
+using namespace moldloft::firmware_like;
+
+int main(int argc, char** argv) {
+  CLI::App app{"Moldloft: measures formed ship plates with a laser-stripe scanner on a robot"};
+  app.require_subcommand(1);
+
+  RunOptions run;
+  auto* run_command = app.add_subcommand("run", "measure one plate on the cell's devices");
+  run_command->add_option("config", run.config_path, "the cell's configuration (TOML)")->required();
+  run_command->add_option("--out", run.out, "the run's folder; default: a new one under out/");
+  run_command->add_flag("--resume", run.resume, "go on with the run in --out after its last stored shot");
+
+  FitOptions fit;
+  auto* fit_command = app.add_subcommand("fit", "outline and surface once more from the shots of a stored run");
+  fit_command->add_option("run", fit.run, "the run's folder")->required();
+  fit_command->add_option("--out", fit.out, "where the results go")->required();
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? exit_done : exit_failed;
+  }
+  if (*run_command) return run_cell(run);
+  if (*fit_command) return fit_run(fit);
+  return exit_failed;
+}

@@ -1,0 +1,41 @@
+// The overview of a run as SVG: the plate in plan view, once with its shape in colour, once with the deviation, each with
+// a scale; over them the outline, the tracker's path and the shots. World coordinates, mm.
+//
+// Set-up and result time only: allocates.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "geometry/bspline.hpp"
+#include "geometry/outline.hpp"
+#include "tasks/boundary_tracker.hpp"
+
+namespace moldloft::firmware_like {
+
+// Values on a regular grid over the surface's (u, v): rows along u. NaN is left blank.
+struct PlateField {
+  int count_u = 0, count_v = 0;
+  std::vector<double> values;  // cell centres
+  std::string title, unit;
+  double scale = 1;  // multiplies the values for the legend (1000: shown in micrometres)
+};
+
+struct OverviewInput {
+  std::string title, subtitle;
+  const geometry::BSplineSurface* surface = nullptr;  // null: only outline, path and shots
+  std::span<const Eigen::Vector2d> edge_points;
+  std::span<const Eigen::Vector2d> corners;
+  std::span<const tasks::ShotPlace> boundary_places, surface_places;
+  double field_x_mm = 102, field_y_mm = 102;
+  std::vector<PlateField> fields;  // one panel each
+};
+
+std::string overview_svg(const OverviewInput&);
+
+// The height over the plate's own best-fit plane: the shape that the yard bends.
+PlateField shape_field(const geometry::BSplineSurface&, int count);
+
+}  // namespace moldloft::firmware_like

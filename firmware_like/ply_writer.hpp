@@ -1,0 +1,17 @@
+// PLY files that anyone can read: binary little-endian, the unit in a comment.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "firmware_like/measured_points.hpp"
+#include "geometry/bspline.hpp"
+
+namespace moldloft::firmware_like {
+
+std::string points_ply(const std::vector<MeasuredPoint>&);
+
+// The surface's border as a closed line of vertices and edges, counter-clockwise.
+std::string boundary_ply(const geometry::BSplineSurface&, int points_per_side);
+
+}  // namespace moldloft::firmware_like

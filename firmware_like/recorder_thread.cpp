@@ -1,0 +1,30 @@
+#include "firmware_like/recorder_thread.hpp"
+
+namespace moldloft::firmware_like {
+namespace {
+
+using namespace std::chrono_literals;
+
+// A frame takes 30 ms on a 100 Mb/s link, the rings hold four: at this period they stay nearly empty, and a transaction
+// still gathers enough to be worth its sync.
+constexpr auto drain_period = 10ms;
+
+}  // namespace
+
+RecorderThread::RecorderThread(hal::Recorder& recorder, hal::RunStore& store)
+    : recorder_{recorder}, store_{store}, thread_{[this] { work(); }} {}
+
+RecorderThread::~RecorderThread() {
+  ending_ = true;
+  thread_.join();
+}
+
+void RecorderThread::work() {
+  while (!ending_) {
+    recorder_.drain(store_);
+    clock_.sleep_until(clock_.now() + drain_period);
+  }
+  recorder_.drain(store_);
+}
+
+}  // namespace moldloft::firmware_like

@@ -1,0 +1,29 @@
+// The ordinary thread that empties the recorder's rings onto the disk every few milliseconds.
+#pragma once
+
+#include <atomic>
+#include <thread>
+
+#include "hal/clock.hpp"
+#include "hal/recorder.hpp"
+#include "hal/run_store.hpp"
+
+namespace moldloft::firmware_like {
+
+class RecorderThread {
+ public:
+  RecorderThread(hal::Recorder&, hal::RunStore&);
+  ~RecorderThread();  // empties the rings a last time
+  RecorderThread(const RecorderThread&) = delete;
+  RecorderThread& operator=(const RecorderThread&) = delete;
+
+ private:
+  void work();
+  hal::Recorder& recorder_;
+  hal::RunStore& store_;
+  hal::SteadyClock clock_;
+  std::atomic<bool> ending_{false};
+  std::thread thread_;
+};
+
+}  // namespace moldloft::firmware_like

@@ -1,0 +1,204 @@
+#include "firmware_like/results.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+
+#include "firmware_like/measured_points.hpp"
+#include "firmware_like/ply_writer.hpp"
+
+namespace moldloft::firmware_like {
+namespace {
+
+constexpr int picture_cells = 56;
+constexpr std::size_t points_in_ply = 200'000;
+// Points farther than this many sigma from the surface are outliers, or not the plate.
+constexpr double gate_sigmas = 10;
+
+double seconds(hal::Duration d) { return std::chrono::duration<double>(d).count(); }
+double micros(hal::Duration d) { return std::chrono::duration<double, std::micro>(d).count(); }
+
+// Rounded to a nanometre: what lies below is the arithmetic's, and makes files hard to read.
+double rounded(double mm) { return std::round(mm * 1e6) / 1e6; }
+
+std::string result_word(const Controller& c) {
+  switch (c.cell().state()) {
+    case tasks::CellState::complete: return "complete";
+    case tasks::CellState::held: return "held";
+    case tasks::CellState::aborted: return "aborted";
+    default: return "stopped";
+  }
+}
+
+Json histogram_json(const tasks::Histogram& h) {
+  return {{"count", h.count()},
+          {"min_us", micros(h.min())},
+          {"avg_us", micros(h.mean())},
+          {"p50_us", micros(h.percentile(0.5))},
+          {"p99_us", micros(h.percentile(0.99))},
+          {"p999_us", micros(h.percentile(0.999))},
+          {"max_us", micros(h.max())},
+          {"overflows", h.overflows()}};
+}
+
+}  // namespace
+
+Json summary_of(const Controller& c, const RunLabel& label) {
+  const auto& cell = c.cell();
+  const auto purpose = [&](hal::ShotPurpose p) { return cell.shots_taken(p); };
+  Json j;
+  j["schema"] = 1;
+  j["unit"] = "mm";
+  j["result"] = result_word(c);
+  j["message"] = std::string{cell.why().view()};
+  j["plate"] = label.plate;
+  j["seed"] = label.seed ? Json(*label.seed) : Json(nullptr);
+  j["shots"] = {{"seek", purpose(hal::ShotPurpose::seek)},
+                {"boundary", purpose(hal::ShotPurpose::boundary)},
+                {"surface", purpose(hal::ShotPurpose::surface)},
+                {"retaken", cell.shots_retaken()}};
+  const bool complete = cell.state() == tasks::CellState::complete;
+  const auto& report = c.surface().fit().report();
+  j["points"] = {{"total", cell.points_seen()}, {"used", complete ? report.points_used : 0}};
+  if (complete) {
+    Json corners = Json::array();
+    for (const auto& corner : c.surface().outline().corners) corners.push_back({rounded(corner.x()), rounded(corner.y())});
+    j["boundary"] = {{"corners_mm", corners},
+                     {"rms_mm", rounded(c.surface().outline().rms_mm)},
+                     {"edge_points", cell.tracker().edge_points().size()}};
+    const auto& surface = c.surface().fit().surface();
+    j["surface"] = {{"control_points", {surface.control_u(), surface.control_v()}},
+                    {"rms_residual_mm", rounded(report.rms_residual_mm)},
+                    {"sigma_mm", rounded(report.sigma_mm)},
+                    {"smallest_pivot", report.smallest_pivot},
+                    {"empty_cells", report.empty_cells},
+                    {"shot_offset_rms_mm", rounded(report.shot_offset_rms_mm)},
+                    {"shot_offset_max_mm", rounded(report.shot_offset_max_mm)},
+                    {"ready_after_last_frame_ms", seconds(cell.surface_after_last_frame()) * 1000}};
+  }
+  const auto& cycle = cell.cycle();
+  const double total = std::max(seconds(cycle.total), 1e-9);
+  j["cycle"] = {{"seconds", seconds(cycle.total)},
+                {"idle_fraction", rounded(seconds(cycle.idle) / total)},
+                {"standing_fraction", rounded(seconds(cycle.standing) / total)}};
+  const auto memory = c.memory();
+  j["memory"] = {{"plan_bytes", total_plan(memory)}, {"high_water_bytes", total_high_water(memory)}};
+  Json parts = Json::object();
+  for (const auto& item : memory) parts[item.subsystem] = {{"plan_bytes", item.plan_bytes}, {"high_water_bytes", item.high_water_bytes}};
+  j["memory"]["subsystems"] = parts;
+  j["recorder_lost"] = c.recorder().lost();
+  return j;
+}
+
+Json surface_json(const geometry::BSplineSurface& s) {
+  Json control = Json::array();
+  for (int i = 0; i < s.control_u(); ++i) {
+    Json row = Json::array();
+    for (int k = 0; k < s.control_v(); ++k) row.push_back({s.x(i, k), s.y(i, k), s.z(i, k)});
+    control.push_back(row);
+  }
+  return {{"schema", 1}, {"unit", "mm"}, {"frame", "world"}, {"degree", {3, 3}},
+          {"knots_u", s.knots_u}, {"knots_v", s.knots_v}, {"control", control}};
+}
+
+Json timing_of(const Controller& c) {
+  const auto& s = c.scheduler();
+  Json j;
+  j["schema"] = 1;
+  j["tick_us"] = micros(s.settings().tick);
+  j["ticks"] = s.ticks();
+  j["missed_ticks"] = s.missed_ticks();
+  j["last_miss_cause"] = s.missed_ticks() > 0 ? std::string{s.name_of(s.last_miss_cause())} : std::string{};
+  j["wake_up"] = histogram_json(s.wake_up());
+  j["slack"] = histogram_json(s.slack());
+  j["frame_to_command"] = histogram_json(c.cell().frame_to_command());
+  for (const auto& t : s.tasks()) {
+    j["tasks"].push_back({{"name", std::string{t.spec.name}}, {"period_ticks", t.spec.period_ticks}, {"budget_us", micros(t.spec.budget)},
+                          {"runs", t.runs}, {"late_starts", t.late_starts}, {"overruns", t.overruns}, {"cost", histogram_json(t.cost)}});
+  }
+  for (const auto& t : s.background()) {
+    j["background"].push_back({{"name", std::string{t.spec.name}}, {"quantum_us", micros(t.spec.quantum)}, {"runs", t.runs}, {"refused", t.refused},
+                               {"forced", t.forced}, {"overruns", t.overruns}, {"cost", histogram_json(t.cost)}});
+  }
+  return j;
+}
+
+std::expected<void, RunError> write_file(const std::filesystem::path& path, std::string_view content) {
+  const std::filesystem::path beside = path.string() + ".new";
+  std::ofstream file{beside, std::ios::binary};
+  file.write(content.data(), static_cast<std::streamsize>(content.size()));
+  file.close();
+  std::error_code failed;
+  if (file) std::filesystem::rename(beside, path, failed);
+  if (!file || failed) return std::unexpected{RunError{fmt::format("{}: cannot be written; is the disk full or read-only?", path.string())}};
+  return {};
+}
+
+namespace {
+
+std::string events_jsonl(const std::vector<hal::EventRecord>& events) {
+  std::string lines;
+  for (const auto& e : events) {
+    Json j = {{"t_ms", std::chrono::duration<double, std::milli>(e.at).count()}, {"source", std::string{e.source.view()}}};
+    const auto put = [&](const char* key, std::string_view text) {
+      if (!text.empty()) j[key] = std::string{text};
+    };
+    put("event", e.event);
+    put("from", e.from);
+    put("to", e.to);
+    put("text", e.text);
+    lines += j.dump() + "\n";
+  }
+  return lines;
+}
+
+std::string picture(const Controller& c, const RunLabel& label, const Json& summary, std::vector<PlateField> fields) {
+  OverviewInput in;
+  in.title = fmt::format("Moldloft run: {} {}", label.plate, label.seed ? fmt::format("(seed {})", *label.seed) : "");
+  in.subtitle = fmt::format("{}; {} boundary and {} surface shots, {} points used, {:.1f} s of cell time", summary["result"].get<std::string>(),
+                            summary["shots"]["boundary"].get<int>(), summary["shots"]["surface"].get<int>(),
+                            summary["points"]["used"].get<std::uint64_t>(), summary["cycle"]["seconds"].get<double>());
+  const bool complete = c.cell().state() == tasks::CellState::complete;
+  if (complete) in.surface = &c.surface().fit().surface();
+  if (complete) in.corners = c.surface().outline().corners;
+  else in.corners = c.cell().tracker().corners();
+  in.edge_points = c.cell().tracker().edge_points();
+  in.boundary_places = c.cell().boundary_places();
+  in.surface_places = c.cell().surface_places();
+  in.field_x_mm = c.config().scanner.field_x_mm;
+  in.field_y_mm = c.config().scanner.field_y_mm;
+  in.fields = std::move(fields);
+  return overview_svg(in);
+}
+
+}  // namespace
+
+std::expected<void, RunError> write_results(const Controller& c, const RunFolder& folder, const RunLabel& label, const Json& summary,
+                                            const std::optional<PlateField>& error_field) {
+  std::expected<void, RunError> result;
+  const auto write = [&](const char* name, std::string_view content) {
+    if (result) result = write_file(folder.path / name, content);
+  };
+  std::vector<PlateField> fields;
+  if (c.cell().state() == tasks::CellState::complete) {
+    const auto& surface = c.surface().fit().surface();
+    const double gate = gate_sigmas * std::max(c.surface().fit().report().sigma_mm, c.config().scanner.noise_mm);
+    const auto points = measured_points(c, *folder.store, points_in_ply, gate);
+    if (!points) return std::unexpected{RunError{points.error().what}};
+    write("surface.json", surface_json(surface).dump() + "\n");
+    write("boundary.ply", boundary_ply(surface, 100));
+    write("points.ply", points_ply(*points));
+    fields = {shape_field(surface, picture_cells), error_field ? *error_field : residual_field(*points, picture_cells)};
+  }
+  const auto events = folder.store->events();
+  if (!events) return std::unexpected{RunError{events.error().what}};
+  write("events.jsonl", events_jsonl(*events));
+  write("overview.svg", picture(c, label, summary, std::move(fields)));
+  write("timing.json", timing_of(c).dump(2) + "\n");
+  write("summary.json", summary.dump(2) + "\n");
+  return result;
+}
+
+}  // namespace moldloft::firmware_like

@@ -1,0 +1,43 @@
+// What a run leaves in its folder besides run.db: summary.json, boundary.ply, points.ply, surface.json, timing.json,
+// events.jsonl and overview.svg. Written after the cell has come to rest; every file states its unit.
+//
+// summary.json, surface.json and events.jsonl depend on the run alone, never on the machine: a simulated run with the
+// same seed gives the same bytes. What was measured in wall-clock time stands in timing.json.
+//
+// Blocking     yes: writes files
+// Failure      one line naming the file
+#pragma once
+
+#include <cstdint>
+#include <expected>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "firmware_like/controller.hpp"
+#include "firmware_like/picture.hpp"
+#include "firmware_like/run_folder.hpp"
+
+namespace moldloft::firmware_like {
+
+struct RunLabel {
+  std::string plate = "measured";
+  std::optional<std::uint64_t> seed;  // of a simulated run
+};
+
+using Json = nlohmann::ordered_json;
+
+Json summary_of(const Controller&, const RunLabel&);
+Json surface_json(const geometry::BSplineSurface&);
+Json timing_of(const Controller&);
+
+// Everything that can be written for the state that the run is in: a run that did not complete has no surface.
+// `error_field`, when given, is what the picture's second panel shows instead of the fit's residuals.
+std::expected<void, RunError> write_results(const Controller&, const RunFolder&, const RunLabel&, const Json& summary,
+                                            const std::optional<PlateField>& error_field = {});
+
+// Replaces a file as a whole: written beside it first, so that a full disk never leaves half a file.
+std::expected<void, RunError> write_file(const std::filesystem::path&, std::string_view content);
+
+}  // namespace moldloft::firmware_like

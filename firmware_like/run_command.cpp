@@ -1,0 +1,166 @@
+#include "firmware_like/run_command.hpp"
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <csignal>
+#include <ctime>
+#include <random>
+
+#include "firmware_like/display.hpp"
+#include "firmware_like/recorder_thread.hpp"
+#include "hal/cable.hpp"
+#include "hal/serial_link.hpp"
+#include "hal/tcp_link.hpp"
+
+namespace moldloft::firmware_like {
+namespace {
+
+int complain(std::string_view what) {
+  fmt::print(stderr, "moldloft: {}\n", what);
+  return exit_failed;
+}
+
+std::atomic<tasks::Cell*> interrupted_cell{nullptr};
+
+// The first ctrl-C stops the arm and saves; the second ends the program the hard way.
+void on_interrupt(int signal) {
+  if (tasks::Cell* cell = interrupted_cell.load()) cell->command(tasks::CellEvent::stop);
+  std::signal(signal, SIG_DFL);
+}
+
+class InterruptGuard {
+ public:
+  explicit InterruptGuard(tasks::Cell& cell) {
+    interrupted_cell = &cell;
+    std::signal(SIGINT, on_interrupt);
+    std::signal(SIGTERM, on_interrupt);
+  }
+  ~InterruptGuard() {
+    std::signal(SIGINT, SIG_DFL);
+    std::signal(SIGTERM, SIG_DFL);
+    interrupted_cell = nullptr;
+  }
+};
+
+void print_memory_plan(const Controller& controller) {
+  fmt::print(stderr, "memory plan:");
+  for (const auto& item : controller.memory()) fmt::print(stderr, " {} {:.1f} MiB,", item.subsystem, static_cast<double>(item.plan_bytes) / (1 << 20));
+  fmt::print(stderr, " {:.1f} MiB in all\n", static_cast<double>(total_plan(controller.memory())) / (1 << 20));
+}
+
+std::string how_to_go_on(const Controller& controller, const RunOptions& options, const std::string& folder) {
+  const std::string resume = fmt::format("moldloft run {} --out {} --resume", options.config_path, folder);
+  const auto why = controller.cell().why().view();
+  switch (controller.cell().state()) {
+    case tasks::CellState::held: return fmt::format("held: {}\nEverything so far is saved; when that is mended: {}", why, resume);
+    case tasks::CellState::aborted: return fmt::format("aborted: {}\nEverything so far is saved; when the cell is clear: {}", why, resume);
+    default: return fmt::format("stopped; the arm stands and everything so far is saved. To go on: {}", resume);
+  }
+}
+
+// Wire ids of this run must differ from those of any run before on the same scanner.
+std::uint32_t fresh_epoch() {
+  std::random_device device;
+  return (device() ^ static_cast<std::uint32_t>(std::time(nullptr))) & 0xFFFFFu;
+}
+
+}  // namespace
+
+int exit_code(const Controller& controller) {
+  switch (controller.cell().state()) {
+    case tasks::CellState::complete: return exit_done;
+    case tasks::CellState::held: return exit_held;
+    case tasks::CellState::aborted: return exit_aborted;
+    default: return exit_stopped;
+  }
+}
+
+std::string result_table(const Json& s, const std::string& folder) {
+  std::string t = fmt::format("\n{:<28}{}\n", "result", s["result"].get<std::string>());
+  const auto row = [&](std::string_view name, const std::string& value) { t += fmt::format("{:<28}{}\n", name, value); };
+  const auto& shots = s["shots"];
+  row("shots", fmt::format("{} seeking, {} boundary, {} surface, {} retaken", shots["seek"].get<int>(), shots["boundary"].get<int>(),
+                           shots["surface"].get<int>(), shots["retaken"].get<int>()));
+  if (s.contains("surface")) {
+    row("points used", fmt::format("{} of {}", s["points"]["used"].get<std::uint64_t>(), s["points"]["total"].get<std::uint64_t>()));
+    std::string corners;
+    for (const auto& c : s["boundary"]["corners_mm"]) corners += fmt::format("({:.2f}, {:.2f}) ", c[0].get<double>(), c[1].get<double>());
+    row("corners, mm", corners);
+    const auto& surface = s["surface"];
+    row("surface", fmt::format("{} x {} control points", surface["control_points"][0].get<int>(), surface["control_points"][1].get<int>()));
+    row("noise of a point, mm", fmt::format("{:.4f}", surface["sigma_mm"].get<double>()));
+    row("shot heights, rms, mm", fmt::format("{:.4f}", surface["shot_offset_rms_mm"].get<double>()));
+  }
+  const auto& cycle = s["cycle"];
+  row("cell time, s", fmt::format("{:.1f} (arm standing {:.0f} %, idle {:.1f} %)", cycle["seconds"].get<double>(),
+                                  100 * cycle["standing_fraction"].get<double>(), 100 * cycle["idle_fraction"].get<double>()));
+  if (s.contains("truth")) {
+    const auto& truth = s["truth"];
+    row("against the truth, mm", fmt::format("normal rms {:.4f}, max {:.4f}; outline max {:.3f}; corner max {:.3f}",
+                                             truth["normal_rms_mm"].get<double>(), truth["normal_max_mm"].get<double>(),
+                                             truth["outline_max_mm"].get<double>(), truth["corner_max_mm"].get<double>()));
+  }
+  row("run folder", folder);
+  return t;
+}
+
+int run_cell(const RunOptions& options) {
+  const auto config = load_config(options.config_path);
+  if (!config) return complain(config.error().what);
+  const std::filesystem::path out = options.out.empty() ? default_run_path() : std::filesystem::path{options.out};
+  if (options.resume && options.out.empty()) return complain("--resume: give the run's folder with --out");
+  auto folder = options.resume ? resume_run(out, config->text) : create_run(out, config->text, RunKind::measured);
+  if (!folder) return complain(folder.error().what);
+
+  hal::SteadyClock clock;
+  const auto scanner_link = hal::make_tcp_link(config->scanner.host, static_cast<std::uint16_t>(config->scanner.port));
+  const auto robot_link = hal::make_serial_link(config->robot.device, config->robot.baud);
+  const auto controller = std::make_unique<Controller>(*config, clock, *scanner_link, *robot_link,
+                                                       ControllerOptions{.archive = folder->archive.get(), .epoch = fresh_epoch()});
+  print_memory_plan(*controller);
+  {
+    const InterruptGuard guard{controller->cell()};
+    const RecorderThread recorder{controller->recorder(), *folder->store};
+    const DisplayThread display{controller->cell()};
+    controller->start();
+    while (controller->tick()) {
+    }
+  }
+  const RunLabel label{.plate = config->name};
+  const Json summary = summary_of(*controller, label);
+  if (const auto written = write_results(*controller, *folder, label, summary); !written) return complain(written.error().what);
+  fmt::print("{}", result_table(summary, out.string()));
+  const int code = exit_code(*controller);
+  if (code != exit_done) fmt::print(stderr, "moldloft: {}\n", how_to_go_on(*controller, options, out.string()));
+  return code;
+}
+
+int fit_run(const FitOptions& options) {
+  auto run = open_run(options.run);
+  if (!run) return complain(run.error().what);
+  const auto text = run->store->meta("config");
+  if (!text) return complain(text.error().what);
+  const auto config = parse_config(*text, options.run + "/run.db");
+  if (!config) return complain(config.error().what);
+
+  hal::VirtualClock clock;
+  hal::Cable none{clock, {}};  // no devices: nothing is ever sent
+  const auto controller = std::make_unique<Controller>(*config, clock, none.host(), none.host(),
+                                                       ControllerOptions{.archive = run->archive.get(), .devices = false});
+  controller->start();
+  while (controller->tick()) {
+  }
+  const RunLabel label{.plate = config->name};
+  const Json summary = summary_of(*controller, label);
+  std::error_code failed;
+  std::filesystem::create_directories(options.out, failed);
+  if (failed) return complain(fmt::format("{}: cannot be created ({})", options.out, failed.message()));
+  RunFolder results{options.out, std::move(run->store), nullptr};
+  if (const auto written = write_results(*controller, results, label, summary); !written) return complain(written.error().what);
+  fmt::print("{}", result_table(summary, options.out));
+  if (exit_code(*controller) != exit_done) return complain(controller->cell().why().view()), exit_code(*controller);
+  return exit_done;
+}
+
+}  // namespace moldloft::firmware_like

@@ -1,0 +1,36 @@
+// `moldloft run` and `moldloft fit`: the cell on real devices, or once more on the shots of a stored run.
+// The value returned is the program's exit code.
+#pragma once
+
+#include <string>
+
+#include "firmware_like/results.hpp"
+
+namespace moldloft::firmware_like {
+
+enum ExitCode : int {
+  exit_done = 0,
+  exit_failed = 1,   // nothing was begun, or a file could not be written
+  exit_held = 2,     // the cell holds for a person
+  exit_aborted = 3,
+  exit_stopped = 4,  // by ctrl-C
+};
+
+struct RunOptions {
+  std::string config_path;
+  std::string out;  // empty: a new folder under out/
+  bool resume = false;
+};
+int run_cell(const RunOptions&);
+
+struct FitOptions {
+  std::string run;  // a run's folder; read only
+  std::string out;  // where the results go; must not be the run itself
+};
+int fit_run(const FitOptions&);
+
+// The table that ends a run, for a person.
+std::string result_table(const Json& summary, const std::string& folder);
+int exit_code(const Controller&);
+
+}  // namespace moldloft::firmware_like

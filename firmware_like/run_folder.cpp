@@ -1,0 +1,80 @@
+#include "firmware_like/run_folder.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <ctime>
+
+namespace moldloft::firmware_like {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::unexpected<RunError> error(std::string what) { return std::unexpected{RunError{std::move(what)}}; }
+
+fs::path store_path(const fs::path& folder) { return folder / "run.db"; }
+
+std::string kind_name(RunKind kind) { return kind == RunKind::simulated ? "simulated" : "measured"; }
+
+std::expected<void, RunError> remove_simulated(const fs::path& folder) {
+  const auto store = hal::RunStore::open(store_path(folder), hal::RunStore::Mode::read);
+  const auto kind = store ? store->meta("kind") : std::expected<std::string, hal::StoreError>{""};
+  if (!kind || *kind != kind_name(RunKind::simulated)) {
+    return error(fmt::format("{}: holds a run already; give another --out", folder.string()));
+  }
+  std::error_code failed;
+  for (const char* file : {"run.db", "run.db-wal", "run.db-shm"}) fs::remove(folder / file, failed);
+  return {};
+}
+
+}  // namespace
+
+std::expected<RunFolder, RunError> create_run(const fs::path& path, const std::string& config_text, RunKind kind) {
+  std::error_code failed;
+  fs::create_directories(path, failed);
+  if (failed) return error(fmt::format("{}: cannot be created ({}); give another --out", path.string(), failed.message()));
+  if (fs::exists(store_path(path))) {
+    if (kind != RunKind::simulated) {
+      return error(fmt::format("{}: holds a run already; give another --out, or --resume to go on with it", path.string()));
+    }
+    if (auto removed = remove_simulated(path); !removed) return std::unexpected{removed.error()};
+  }
+  auto store = hal::RunStore::open(store_path(path), hal::RunStore::Mode::create);
+  if (!store) return error(store.error().what);
+  for (const auto& [key, value] : {std::pair<std::string, std::string>{"kind", kind_name(kind)}, {"config", config_text}}) {
+    if (auto written = store->set_meta(key, value); !written) return error(written.error().what);
+  }
+  return RunFolder{path, std::make_unique<hal::RunStore>(std::move(*store)), nullptr};
+}
+
+std::expected<RunFolder, RunError> resume_run(const fs::path& path, const std::string& config_text) {
+  auto opened = open_run(path);
+  if (!opened) return opened;
+  const auto config = opened->store->meta("config");
+  if (config && *config != config_text) {
+    return error(fmt::format("{}: was begun with another configuration; resume it with that one (meta 'config' in run.db)",
+                             path.string()));
+  }
+  auto store = hal::RunStore::open(store_path(path), hal::RunStore::Mode::append);
+  if (!store) return error(store.error().what);
+  opened->store = std::make_unique<hal::RunStore>(std::move(*store));
+  return opened;
+}
+
+std::expected<RunFolder, RunError> open_run(const fs::path& path) {
+  if (!fs::exists(store_path(path))) {
+    return error(fmt::format("{}: no run.db there; give the folder of a run", path.string()));
+  }
+  auto store = hal::RunStore::open(store_path(path), hal::RunStore::Mode::read);
+  if (!store) return error(store.error().what);
+  auto shots = StoredShots::load(*store);
+  if (!shots) return error(shots.error().what);
+  return RunFolder{path, std::make_unique<hal::RunStore>(std::move(*store)), std::make_unique<StoredShots>(std::move(*shots))};
+}
+
+fs::path default_run_path() {
+  const std::time_t now = std::time(nullptr);
+  return fs::path{"out"} / fmt::format("run-{:%Y%m%d-%H%M%S}", *std::localtime(&now));
+}
+
+}  // namespace moldloft::firmware_like

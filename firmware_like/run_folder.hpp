@@ -1,0 +1,36 @@
+// The folder of one run: created before anything moves, so that a full or read-only disk shows at once.
+//
+// Blocking     yes; set-up time only
+// Failure      one line: what, where, what to do. A folder that holds a run is never overwritten, only resumed
+//              (simulated runs, which a seed brings back, may be replaced by simulated runs)
+#pragma once
+
+#include <expected>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "firmware_like/shot_files.hpp"
+#include "hal/run_store.hpp"
+
+namespace moldloft::firmware_like {
+
+struct RunError {
+  std::string what;
+};
+
+struct RunFolder {
+  std::filesystem::path path;
+  std::unique_ptr<hal::RunStore> store;
+  std::unique_ptr<StoredShots> archive;  // resumed: the shots that are there already
+};
+
+enum class RunKind { measured, simulated };
+
+std::expected<RunFolder, RunError> create_run(const std::filesystem::path&, const std::string& config_text, RunKind);
+std::expected<RunFolder, RunError> resume_run(const std::filesystem::path&, const std::string& config_text);
+std::expected<RunFolder, RunError> open_run(const std::filesystem::path&);  // to read only
+
+std::filesystem::path default_run_path();  // out/run-YYYYmmdd-HHMMSS
+
+}  // namespace moldloft::firmware_like

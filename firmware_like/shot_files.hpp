@@ -1,0 +1,23 @@
+// The shots of a run store, in memory, as an archive for the cell: what --resume and `moldloft fit` go through first.
+// Memory: 650 kB a shot of 50,000 points; loaded before the first tick.
+#pragma once
+
+#include <map>
+
+#include "hal/run_store.hpp"
+#include "tasks/shot_archive.hpp"
+
+namespace moldloft::firmware_like {
+
+class StoredShots final : public tasks::ShotArchive {
+ public:
+  static std::expected<StoredShots, hal::StoreError> load(const hal::RunStore&);
+  const tasks::ArchivedShot* find(std::uint32_t number) const override;
+  std::size_t size() const { return shots_.size(); }
+
+ private:
+  std::vector<std::unique_ptr<hal::Frame>> frames_;
+  std::map<std::uint32_t, tasks::ArchivedShot> shots_;
+};
+
+}  // namespace moldloft::firmware_like

@@ -1,0 +1,90 @@
+#include "firmware_like/toml_section.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace moldloft::firmware_like {
+
+TomlSection::TomlSection(const toml::table* table, std::string name, std::string path, std::optional<std::string>& error)
+    : table_{table}, name_{std::move(name)}, path_{std::move(path)}, error_{error} {}
+
+const toml::node* TomlSection::node(std::string_view key) {
+  known_.emplace(key);
+  return table_ == nullptr ? nullptr : table_->get(key);
+}
+
+void TomlSection::wrong(const toml::node& at, std::string_view key, std::string_view what) {
+  if (error_) return;
+  const std::string section = name_.empty() ? "" : fmt::format("[{}] ", name_);
+  error_ = fmt::format("{}:{}: {}{}: {}", path_, at.source().begin.line, section, key, what);
+}
+
+void TomlSection::number(std::string_view key, double& value, double min, double max) {
+  const toml::node* n = node(key);
+  if (n == nullptr) return;
+  const auto v = n->value<double>();
+  if (!v || !n->is_number()) return wrong(*n, key, "a number is wanted");
+  if (!std::isfinite(*v) || *v < min || *v > max) return wrong(*n, key, fmt::format("{} is outside {} to {}", *v, min, max));
+  value = *v;
+}
+
+void TomlSection::integer(std::string_view key, int& value, int min, int max) {
+  const toml::node* n = node(key);
+  if (n == nullptr) return;
+  if (!n->is_integer()) return wrong(*n, key, "a whole number is wanted");
+  const auto v = *n->value<std::int64_t>();
+  if (v < min || v > max) return wrong(*n, key, fmt::format("{} is outside {} to {}", v, min, max));
+  value = static_cast<int>(v);
+}
+
+void TomlSection::text(std::string_view key, std::string& value) {
+  const toml::node* n = node(key);
+  if (n == nullptr) return;
+  if (!n->is_string()) return wrong(*n, key, "a text in quotes is wanted");
+  value = *n->value<std::string>();
+}
+
+void TomlSection::choice(std::string_view key, std::string& value, const std::vector<std::string>& allowed) {
+  const toml::node* n = node(key);
+  if (n == nullptr) return;
+  text(key, value);
+  if (std::find(allowed.begin(), allowed.end(), value) == allowed.end()) {
+    wrong(*n, key, fmt::format("'{}' is not one of: {}", value, fmt::join(allowed, ", ")));
+  }
+}
+
+void TomlSection::numbers(std::string_view key, std::span<double> values, double min, double max) {
+  const toml::node* n = node(key);
+  if (n == nullptr) return;
+  const toml::array* array = n->as_array();
+  if (array == nullptr || array->size() != values.size()) {
+    return wrong(*n, key, fmt::format("an array of {} numbers is wanted", values.size()));
+  }
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const auto v = array->get(i)->value<double>();
+    if (!v || !array->get(i)->is_number()) return wrong(*n, key, fmt::format("an array of {} numbers is wanted", values.size()));
+    if (!std::isfinite(*v) || *v < min || *v > max) return wrong(*n, key, fmt::format("{} is outside {} to {}", *v, min, max));
+    values[i] = *v;
+  }
+}
+
+TomlSection TomlSection::section(std::string_view key) {
+  const toml::node* n = node(key);
+  const toml::table* table = n == nullptr ? nullptr : n->as_table();
+  if (n != nullptr && table == nullptr) wrong(*n, key, "a table is wanted");
+  return {table, name_.empty() ? std::string{key} : fmt::format("{}.{}", name_, key), path_, error_};
+}
+
+void TomlSection::finish() {
+  if (table_ == nullptr) return;
+  for (const auto& [key, value] : *table_) {
+    if (!known_.contains(key.str())) {
+      wrong(value, key.str(), fmt::format("unknown key; known here: {}", fmt::join(known_, ", ")));
+    }
+  }
+}
+
+}  // namespace moldloft::firmware_like

@@ -1,0 +1,41 @@
+// One table of a TOML file, read key by key: each getter notes the first thing that is wrong, finish() also notes keys
+// that nobody asked for. Values keep their defaults where the key is absent.
+//
+// Setup time only: allocates. The first error of a file wins and is reported with its line.
+#pragma once
+
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <toml++/toml.h>
+#include <vector>
+
+namespace moldloft::firmware_like {
+
+class TomlSection {
+ public:
+  // `table` may be null: then every key is absent. `error` is shared by all sections of a file.
+  TomlSection(const toml::table* table, std::string name, std::string path, std::optional<std::string>& error);
+  ~TomlSection() = default;
+
+  void number(std::string_view key, double& value, double min, double max);
+  void integer(std::string_view key, int& value, int min, int max);
+  void text(std::string_view key, std::string& value);
+  void choice(std::string_view key, std::string& value, const std::vector<std::string>& allowed);
+  void numbers(std::string_view key, std::span<double> values, double min, double max);  // an array of that length
+  TomlSection section(std::string_view key);
+  void finish();  // unknown keys are an error
+
+ private:
+  const toml::node* node(std::string_view key);
+  void wrong(const toml::node& at, std::string_view key, std::string_view what);
+
+  const toml::table* table_;
+  std::string name_, path_;
+  std::optional<std::string>& error_;
+  std::set<std::string, std::less<>> known_;
+};
+
+}  // namespace moldloft::firmware_like
