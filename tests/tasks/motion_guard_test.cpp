@@ -1,0 +1,38 @@
+#include "tasks/motion_guard.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <string>
+
+using namespace moldloft;
+using namespace moldloft::tasks;
+
+namespace {
+const Workspace cell{.x_mm = {-800, 800}, .y_mm = {-800, 800}, .z_mm = {200, 500}, .reach_mm = {250, 800}, .max_step_mm = 600, .max_speed_percent = 80};
+const hal::Pose standing{.x_mm = 500, .z_mm = 300};
+
+std::string refusal(const hal::Pose& target, int speed = 50) {
+  const auto no = refuse_target(target, standing, speed, cell);
+  return no ? std::string{no->view()} : "";
+}
+}  // namespace
+
+TEST_CASE("a target within every limit may be sent") {
+  CHECK(refusal({.x_mm = 600, .y_mm = 100, .z_mm = 300}) == "");
+  CHECK(refusal({.x_mm = 800, .z_mm = 500}) == "");  // limits belong to the workspace
+}
+
+TEST_CASE("each limit refuses by its name and value") {
+  CHECK(refusal({.x_mm = 801, .z_mm = 300}) == "target outside the workspace: x 801.0 mm, limit -800.0 to 800.0 mm");
+  CHECK(refusal({.x_mm = 500, .z_mm = 199}) == "target outside the workspace: z 199.0 mm, limit 200.0 to 500.0 mm");
+  CHECK(refusal({.x_mm = 100, .y_mm = 100, .z_mm = 300}).find("reach 141.4") != std::string::npos);
+  CHECK(refusal({.x_mm = -500, .z_mm = 300}).find("step 1000.0") != std::string::npos);
+  CHECK(refusal({.x_mm = 500, .z_mm = 300}, 81).find("speed 81 %") != std::string::npos);
+  CHECK(refusal({.x_mm = 500, .z_mm = 300}, 0).find("speed 0 %") != std::string::npos);
+}
+
+TEST_CASE("a target that is not a number is refused before any comparison with it") {
+  CHECK(refusal({.x_mm = NAN, .z_mm = 300}).find("not finite") != std::string::npos);
+  CHECK(refusal({.x_mm = 500, .z_mm = 300, .roll = INFINITY}).find("not finite") != std::string::npos);
+}

@@ -1,0 +1,57 @@
+// A clock that moves only when a task says what it costs, and tasks that follow a script of costs.
+#pragma once
+
+#include <vector>
+
+#include "tasks/scheduler.hpp"
+
+namespace moldloft::tasks {
+
+class ScriptedClock final : public hal::Clock {
+ public:
+  Instant now() noexcept override { return now_; }
+  void sleep_until(Instant wake) noexcept override {
+    if (wake > now_) now_ = wake;
+    now_ += oversleep;
+  }
+  void charge(Duration) noexcept override {}
+  void pass(Duration d) noexcept { now_ += d; }
+
+  Duration oversleep{0};  // how late the next wake-ups are
+
+ private:
+  Instant now_{0};
+};
+
+class ScriptedTask final : public Task {
+ public:
+  ScriptedTask(ScriptedClock& clock, std::vector<Duration> costs) : clock_{clock}, costs_{std::move(costs)} {}
+  void run(Instant now) override {
+    starts.push_back(now);
+    clock_.pass(starts.size() <= costs_.size() ? costs_[starts.size() - 1] : Duration{0});
+  }
+  std::vector<Instant> starts;
+
+ private:
+  ScriptedClock& clock_;
+  std::vector<Duration> costs_;
+};
+
+class ScriptedBackground final : public BackgroundTask {
+ public:
+  ScriptedBackground(ScriptedClock& clock, int pieces, Duration cost) : pieces{pieces}, cost{cost}, clock_{clock} {}
+  bool has_work() const override { return pieces > 0; }
+  void step(Instant) override {
+    starts.push_back(clock_.now());
+    --pieces;
+    clock_.pass(cost);
+  }
+  int pieces;
+  Duration cost;
+  std::vector<Instant> starts;
+
+ private:
+  ScriptedClock& clock_;
+};
+
+}  // namespace moldloft::tasks
