@@ -24,12 +24,10 @@ class ByteLink {
   // Moves bytes that have arrived into `out`; returns how many, 0 if none are there now.
   virtual std::size_t read(std::span<std::byte> out) noexcept = 0;
 
-  // Takes what fits into the send buffer; returns how many bytes were taken. The rest is the caller's to
-  // keep.
+  // Takes what fits into the send buffer; returns how many bytes were taken. The rest is the caller's to keep.
   virtual std::size_t write(std::span<const std::byte> in) noexcept = 0;
 
-  // Looks at the link once more (a pending connect may have ended, a peer may have hung up) and says how it
-  // stands.
+  // Looks at the link once more (a pending connect may have ended, a peer may have hung up) and says how it stands.
   virtual LinkState state() noexcept = 0;
   virtual std::string_view why() const noexcept = 0;
 };

@@ -1,11 +1,9 @@
-// A simulated cable: two byte links that are each other's far end, with a rate and a delay, in the time of a
-// clock.
+// A simulated cable: two byte links that are each other's far end, with a rate and a delay, in the time of a clock.
 //
 // Thread       one thread
 // Blocking     never
 // Allocation   in the constructor only
-// Failure      cut() loses the link on both sides; open() on the host's side brings it back once mend() was
-// called
+// Failure      cut() loses the link on both sides; open() on the host's side brings it back once mend() was called
 #pragma once
 
 #include <memory>
@@ -27,8 +25,9 @@ class Cable {
   ~Cable();
 
   ByteLink& host() noexcept;    // the controller's end; open() succeeds at once while the cable is whole
-  ByteLink& device() noexcept;  // the device's end; open while the host's end is open. After the host has opened anew
-                                // it is `lost` for one look: that is how a server learns of the new connection
+  // The device's end; open while the host's end is open. After the host has opened anew it is `lost` for one look:
+  // that is how a server learns of the new connection.
+  ByteLink& device() noexcept;
   void cut() noexcept;
   void mend() noexcept;
 

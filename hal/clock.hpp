@@ -22,8 +22,8 @@ class Clock {
   virtual Instant now() noexcept = 0;
   virtual void sleep_until(Instant wake) noexcept = 0;  // returns at once when `wake` has passed
 
-  // Says that work of this declared cost has just been done. A real clock has seen it pass and ignores the
-  // call; a virtual clock moves by it, so that a simulated tick costs what its tasks declare.
+  // Says that work of this declared cost has just been done. A real clock has seen it pass and ignores the call; a
+  // virtual clock moves by it, so that a simulated tick costs what its tasks declare.
   virtual void charge(Duration) noexcept {}
 };
 
@@ -38,8 +38,8 @@ class SteadyClock final : public Clock {
   Duration start_;
 };
 
-// Time that moves only when somebody sleeps or charges a cost. The world that lives in this time (simulated
-// devices) is carried along by overriding advance().
+// Time that moves only when somebody sleeps or charges a cost. The world that lives in this time (simulated devices)
+// is carried along by overriding advance().
 class VirtualClock : public Clock {
  public:
   Instant now() noexcept final { return now_; }

@@ -1,7 +1,7 @@
 // One exposure of the scanner, decoded: stripes of points in scanner coordinates, column by column.
 //
-// Scanner coordinates: origin at the centre of the field of view, z towards the scanner, stripes run along y
-// and follow one another along x; millimetres. A missing point has NaN in x, y and z.
+// Scanner coordinates: origin at the centre of the field of view, z towards the scanner, stripes run along y and follow
+// one another along x; millimetres. A missing point has NaN in x, y and z.
 //
 // Thread       the control thread
 // Allocation   in the constructor only: a frame never holds more than the sensor said it can deliver

@@ -1,6 +1,5 @@
 // A pose of the robot's tip as the controllers of the field write it: position and V+'s ZYZ' Euler angles.
-// Frame of reference: tip in world (world_from_tip). Angles inside the program are radians; the wire carries
-// degrees.
+// Frame of reference: tip in world (world_from_tip). Angles inside the program are radians; the wire carries degrees.
 #pragma once
 
 #include <cmath>

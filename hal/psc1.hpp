@@ -1,8 +1,8 @@
 // The scanner's wire, PSC1, as pure functions on bytes. The specification is PROTOCOLS.md; this is its code.
 //
 // Both sides use these functions: the driver of the cell and the device server of the simulation.
-// Little-endian. Every message is a header of 32 bytes, a payload, and the payload's CRC-32C (absent when the
-// payload is empty).
+// Little-endian. Every message is a header of 32 bytes, a payload, and the payload's CRC-32C (absent when the payload
+// is empty).
 //
 // Thread       any: no state
 // Allocation   none; encoders write into the caller's buffer
@@ -21,47 +21,21 @@ namespace moldloft::hal::psc1 {
 
 constexpr std::size_t header_size = 32;
 constexpr std::size_t payload_crc_size = 4;
-constexpr std::uint32_t max_payload = 8u
-                                      << 20;  // a length beyond this is refused even under a valid header CRC
+constexpr std::uint32_t max_payload = 8u << 20;  // a length beyond this is refused even under a valid header CRC
 constexpr std::uint8_t protocol_version = 1;
 constexpr std::uint16_t default_port = 4014;
 
 enum class Type : std::uint8_t {
-  hello = 1,
-  config = 2,
-  trigger = 3,
-  exposed = 4,
-  frame = 5,
-  status = 6,
-  ping = 7,
-  error = 8,
-  reset = 9
+  hello = 1, config = 2, trigger = 3, exposed = 4, frame = 5, status = 6, ping = 7, error = 8, reset = 9
 };
 
 enum class Status : std::uint16_t {
-  ok = 0,
-  bad_state = 1,
-  bad_argument = 2,
-  unsupported = 3,
-  busy = 4,
-  sensor_fault = 5,
-  timeout = 6
+  ok = 0, bad_state = 1, bad_argument = 2, unsupported = 3, busy = 4, sensor_fault = 5, timeout = 6
 };
 
 enum class Encoding : std::uint8_t { int16 = 0, float32 = 1 };
 
-enum class Flaw {
-  none,
-  too_short,
-  magic,
-  header_crc,
-  version,
-  type,
-  length,
-  payload_crc,
-  payload_size,
-  content
-};
+enum class Flaw { none, too_short, magic, header_crc, version, type, length, payload_crc, payload_size, content };
 std::string_view to_string(Flaw);
 
 struct Header {
@@ -72,9 +46,7 @@ struct Header {
   std::uint64_t acquired_ns = 0;  // sensor clock; 0 where nothing was acquired
 };
 
-struct HelloRequest {
-  std::uint8_t version_min = protocol_version, version_max = protocol_version;
-};
+struct HelloRequest { std::uint8_t version_min = protocol_version, version_max = protocol_version; };
 struct HelloReply {
   Status status = Status::ok;
   std::uint8_t version = protocol_version;
@@ -90,9 +62,7 @@ struct Config {  // asked and, with a status, granted
   bool intensity = true;
   std::uint16_t stripes = 0, points_per_stripe = 0;  // 0: as many as the sensor has
 };
-struct Trigger {
-  std::uint32_t shot_id = 0;
-};
+struct Trigger { std::uint32_t shot_id = 0; };
 struct Exposed {
   std::uint32_t shot_id = 0, session_id = 0;
   bool repeated = false;  // the shot had been exposed before: the stored frame follows
@@ -124,21 +94,17 @@ std::uint32_t crc32c(std::span<const std::byte> bytes, std::uint32_t before = 0)
 void encode_header(const Header&, std::span<std::byte, header_size> out) noexcept;
 std::expected<Header, Flaw> decode_header(std::span<const std::byte, header_size> in) noexcept;
 
-// ---- whole messages: header, payload, payload CRC into `out`; returns the bytes written, 0 if `out` is too
-// small
+// ---- whole messages: header, payload, payload CRC into `out`; returns the bytes written, 0 if `out` is too small
 std::size_t encode(std::uint32_t request_id, const HelloRequest&, std::span<std::byte> out) noexcept;
 std::size_t encode(std::uint32_t request_id, const HelloReply&, std::span<std::byte> out) noexcept;
 std::size_t encode(std::uint32_t request_id, const Config&, std::span<std::byte> out) noexcept;
 std::size_t encode(std::uint32_t request_id, const Trigger&, std::span<std::byte> out) noexcept;
-std::size_t encode(std::uint32_t request_id, const Exposed&, std::uint64_t acquired_ns,
-                   std::span<std::byte> out) noexcept;
+std::size_t encode(std::uint32_t request_id, const Exposed&, std::uint64_t acquired_ns, std::span<std::byte> out) noexcept;
 std::size_t encode(std::uint32_t request_id, const StatusReply&, std::span<std::byte> out) noexcept;
 std::size_t encode(std::uint32_t request_id, const ErrorReply&, std::span<std::byte> out) noexcept;
-std::size_t encode_empty(std::uint32_t request_id, Type,
-                         std::span<std::byte> out) noexcept;  // PING, RESET, STATUS request
+std::size_t encode_empty(std::uint32_t request_id, Type, std::span<std::byte> out) noexcept;  // PING, RESET, STATUS request
 
-// A frame as it goes over the wire. int16 takes scale and offset from the extent that `field` gives (+-x,
-// +-y, +-depth).
+// A frame as it goes over the wire. int16 takes scale and offset from the extent that `field` gives (+-x, +-y, +-depth).
 std::size_t encoded_frame_size(const Frame&, Encoding, bool intensity) noexcept;
 std::size_t encode_frame(std::uint32_t request_id, const Frame&, Encoding, bool intensity,
                          const std::array<float, 3>& half_extent_mm, std::span<std::byte> out) noexcept;

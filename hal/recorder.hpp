@@ -1,16 +1,13 @@
-// The way from the control thread to the disk: two single-producer single-consumer rings of records, one for
-// the bulk of scanner bytes and one for everything else, so that a frame on its way can never crowd out an
-// event.
+// The way from the control thread to the disk: two single-producer single-consumer rings of records, one for the bulk
+// of scanner bytes and one for everything else, so that a frame on its way can never crowd out an event.
 //
-// Thread       link_bytes(), event(), shot(), room_for_frame(): the control thread. drain(): one other
-// thread, or the
+// Thread       link_bytes(), event(), shot(), room_for_frame(): the control thread. drain(): one other thread, or the
 //              simulation's idle time.
 // Blocking     the control thread never; drain() writes to disk
 // Allocation   in the constructor only, on the control thread's side
-// Failure      a full ring drops the record and counts it in lost(). Scanner bytes are never dropped as long
-// as the
-//              cell triggers only when room_for_frame() says yes. A store that fails to write keeps the
-//              records in the rings: room_for_frame() turns false and store_error() says why.
+// Failure      a full ring drops the record and counts it in lost(). Scanner bytes are never dropped as long as the
+//              cell triggers only when room_for_frame() says yes. A store that fails to write keeps the records in the
+//              rings: room_for_frame() turns false and store_error() says why.
 #pragma once
 
 #include <atomic>
@@ -40,10 +37,10 @@ class Recorder {
   void event(const EventRecord&) noexcept;
   void shot(const ShotRecord&) noexcept;
   bool room_for_frame() const noexcept;
-  std::uint64_t lost() const noexcept;                     // records dropped since the start
-  std::uint64_t offset(LinkId, Direction) const noexcept;  // bytes recorded so far
-  std::size_t plan_bytes() const noexcept;                 // both rings
-  std::size_t high_water_bytes() const noexcept;           // the fullest that they have been
+  std::uint64_t lost() const noexcept;                                // records dropped since the start
+  std::uint64_t offset(LinkId, Direction) const noexcept;             // bytes recorded so far
+  std::size_t plan_bytes() const noexcept;                            // both rings
+  std::size_t high_water_bytes() const noexcept;                      // the fullest that they have been
 
   // ---- the other side
   // Moves everything that is there into the store, in one transaction; false when the store refused.

@@ -1,11 +1,10 @@
-// What the cell asks of a robot arm, whatever its make. A new make implements this and gets one line in the
-// factory of firmware_like/.
+// What the cell asks of a robot arm, whatever its make. A new make implements this and gets one line in the factory of
+// firmware_like/.
 //
 // Thread       the control thread; receive() early in a tick, transmit() late in it
 // Blocking     never
 // Allocation   none after construction
-// Failure      a command is repeated on the wire until its fate is known, never issued under a second number:
-// no fault
+// Failure      a command is repeated on the wire until its fate is known, never issued under a second number: no fault
 //              of the link can move the arm twice; what the driver cannot mend comes out as an event
 #pragma once
 
@@ -28,12 +27,12 @@ enum class RobotState {
 
 struct RobotEvent {
   enum class Kind {
-    ready,    // synchronised; pose says where the arm stands, calibrated whether it knows that
-    moving,   // the command was checked and motion has started
-    done,     // stopped and settled; pose was read back
-    refused,  // ERR: the controller will not do it; code says why
-    fault,    // e-stop, power loss, watchdog, error during motion; latched
-    lost,     // the link is gone or the robot is silent beyond the limit
+    ready,      // synchronised; pose says where the arm stands, calibrated whether it knows that
+    moving,     // the command was checked and motion has started
+    done,       // stopped and settled; pose was read back
+    refused,    // ERR: the controller will not do it; code says why
+    fault,      // e-stop, power loss, watchdog, error during motion; latched
+    lost,       // the link is gone or the robot is silent beyond the limit
   };
   Kind kind;
   Pose pose;
@@ -50,8 +49,7 @@ class Robot {
   virtual void receive(Instant now) = 0;
   virtual void transmit(Instant now) = 0;
 
-  // One command at a time: false unless state() is ready. move() drives the tip to `target` at
-  // `speed_percent` (1-100).
+  // One command at a time: false unless state() is ready. move() drives the tip to `target` at `speed_percent` (1-100).
   virtual bool move(const Pose& target, int speed_percent, Instant now) = 0;
   virtual bool calibrate(Instant now) = 0;
   virtual void stop(Instant now) = 0;   // harmless, at any time: motion ends as fast as the controller allows

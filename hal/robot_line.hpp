@@ -1,5 +1,5 @@
-// The robot's wire: ASCII lines with a number and a Fletcher-16 checksum, as pure functions on text. The
-// specification is PROTOCOLS.md; this is its code.
+// The robot's wire: ASCII lines with a number and a Fletcher-16 checksum, as pure functions on text. The specification
+// is PROTOCOLS.md; this is its code.
 //
 //     >0123 MOV 412.350 -88.120 155.000 0.000 180.000 35.000 50 *31910       host to robot
 //     <0123 DON 412.348 -88.121 155.001 0.001 180.000 34.998 *31027          robot to host
@@ -24,18 +24,9 @@ constexpr int last_number = 9999;        // 0001 follows 9999; 0000 marks the li
 using Line = FixedText<max_length + 1>;  // with its LF
 
 enum class Verb {
-  mov,
-  cal,  // host, numbered: change something
-  syn,
-  png,
-  sta,
-  pos,
-  stp,  // host, 0000: harmless, answered at any time
-  ack,
-  don,
-  err,
-  nak,
-  evt,  // robot
+  mov, cal,                 // host, numbered: change something
+  syn, png, sta, pos, stp,  // host, 0000: harmless, answered at any time
+  ack, don, err, nak, evt,  // robot
 };
 
 enum class Refusal { checksum, sequence, not_synchronised };  // NAK CK, NAK SQ last, NAK SY
@@ -52,13 +43,13 @@ struct Status {
 struct Command {  // a host line
   int number = 0;
   Verb verb = Verb::png;
-  Pose pose;                // MOV
-  int speed_percent = 0;    // MOV
-  std::uint32_t nonce = 0;  // SYN
+  Pose pose;               // MOV
+  int speed_percent = 0;   // MOV
+  std::uint32_t nonce = 0; // SYN
 };
 
-// What EVT says, unasked, once a second until the next SYN. Positive, so that they never meet V+'s own error numbers,
-// which are negative and pass through ERR and STA as they are.
+// What EVT says, unasked, once a second until the next SYN. Positive, so that they never meet V+'s own error
+// numbers, which are negative and pass through ERR and STA as they are.
 enum class Event : int { emergency_stop = 1, power_lost = 2, watchdog = 3, motion_failed = 4 };
 
 // An answer to a 0000 line has number 0, verb ack and the question in `answers`; on the wire it begins with the
@@ -66,14 +57,14 @@ enum class Event : int { emergency_stop = 1, power_lost = 2, watchdog = 3, motio
 struct Reply {  // a robot line
   int number = 0;
   Verb verb = Verb::ack;
-  Pose pose;  // DON, and the answer to POS
+  Pose pose;                // DON, and the answer to POS
   bool has_pose = false;
-  Verb answers = Verb::ack;  // for 0000 lines: which question is answered (syn, png, sta, pos, stp)
-  Status status;             // STA
-  std::uint32_t nonce = 0;   // SYN
-  int code = 0;              // ERR, EVT
-  Refusal refusal{};         // NAK
-  int last_number = 0;       // NAK SQ
+  Verb answers = Verb::ack; // for 0000 lines: which question is answered (syn, png, sta, pos, stp)
+  Status status;            // STA
+  std::uint32_t nonce = 0;  // SYN
+  int code = 0;             // ERR, EVT
+  Refusal refusal{};        // NAK
+  int last_number = 0;      // NAK SQ
 };
 
 enum class Flaw { none, start, length, characters, checksum, number, verb, fields };

@@ -1,7 +1,7 @@
 // What a run remembers, as the control thread hands it over: link bytes, events, shots.
 //
-// The control thread writes into rings (recorder.hpp), another thread or the simulation's idle time drains
-// them into the run store (run_store.hpp).
+// The control thread writes into rings (recorder.hpp), another thread or the simulation's idle time drains them into
+// the run store (run_store.hpp).
 #pragma once
 
 #include <cstdint>
@@ -34,8 +34,8 @@ struct EventRecord {
 
 enum class ShotPurpose : std::uint8_t { seek = 0, boundary = 1, surface = 2 };
 
-// A shot points into the recorded bytes: the FRAME payload is the `payload_bytes` received bytes of the
-// scanner link from `payload_offset` on. So a frame is stored once, as it came.
+// A shot points into the recorded bytes: the FRAME payload is the `payload_bytes` received bytes of the scanner link
+// from `payload_offset` on. So a frame is stored once, as it came.
 struct ShotRecord {
   Instant at{0};  // when its last byte had been read
   std::uint32_t shot_id = 0;

@@ -1,10 +1,9 @@
-// The run store: one SQLite file that holds everything of a run as it happened, so that it can be replayed,
-// fitted again or resumed.
+// The run store: one SQLite file that holds everything of a run as it happened, so that it can be replayed, fitted
+// again or resumed.
 //
-// Tables: meta(key, value), link_bytes(link, direction, offset, t_ns, bytes), events(seq, t_ns, source,
-// event, from_state, to_state, text), shots(shot_id, t_ns, purpose, attempts, commanded and reported pose,
-// payload_offset, payload_bytes). The layout is documented in README.md; `meta` holds the schema version and
-// the configuration.
+// Tables: meta(key, value), link_bytes(link, direction, offset, t_ns, bytes), events(seq, t_ns, source, event,
+// from_state, to_state, text), shots(shot_id, t_ns, purpose, attempts, commanded and reported pose, payload_offset,
+// payload_bytes). The layout is documented in README.md; `meta` holds the schema version and the configuration.
 //
 // Thread       one thread at a time
 // Blocking     yes: it is a disk
@@ -48,8 +47,7 @@ class RunStore {
   std::expected<std::string, StoreError> meta(std::string_view key) const;
   std::expected<std::vector<ShotRecord>, StoreError> shots() const;
   std::expected<std::vector<EventRecord>, StoreError> events() const;
-  std::expected<std::vector<std::byte>, StoreError> bytes(LinkId, Direction, std::uint64_t offset,
-                                                          std::uint64_t size) const;
+  std::expected<std::vector<std::byte>, StoreError> bytes(LinkId, Direction, std::uint64_t offset, std::uint64_t size) const;
   std::expected<Frame, StoreError> frame(const ShotRecord&) const;  // decoded from the bytes as they came
 
  private:

@@ -1,11 +1,10 @@
-// What the cell asks of a laser-stripe scanner, whatever its make. A new make implements this and gets one
-// line in the factory of firmware_like/.
+// What the cell asks of a laser-stripe scanner, whatever its make. A new make implements this and gets one line in the
+// factory of firmware_like/.
 //
 // Thread       the control thread; receive() early in a tick, transmit() late in it
 // Blocking     never
 // Allocation   none after construction
-// Failure      the driver keeps the link alive by itself: it reconnects with back-off, greets and configures
-// again, and
+// Failure      the driver keeps the link alive by itself: it reconnects with back-off, greets and configures again, and
 //              repeats a request (at most twice) under its shot id; what it cannot mend comes out as an event
 #pragma once
 
@@ -19,11 +18,11 @@
 namespace moldloft::hal {
 
 enum class ScannerState {
-  offline,    // no link, or one that is being opened
-  greeting,   // link open, HELLO or CONFIG on its way
-  ready,      // may be triggered
-  exposing,   // TRIGGER sent, EXPOSED awaited: the arm must stand still
-  computing,  // EXPOSED seen, FRAME awaited: the arm may move
+  offline,     // no link, or one that is being opened
+  greeting,    // link open, HELLO or CONFIG on its way
+  ready,       // may be triggered
+  exposing,    // TRIGGER sent, EXPOSED awaited: the arm must stand still
+  computing,   // EXPOSED seen, FRAME awaited: the arm may move
 };
 
 struct ScannerEvent {
@@ -45,23 +44,21 @@ class Scanner {
  public:
   virtual ~Scanner() = default;
 
-  virtual void start(Instant now) = 0;     // begins to connect
-  virtual void receive(Instant now) = 0;   // reads a bounded number of bytes and works on them
-  virtual void transmit(Instant now) = 0;  // time-outs, requests, heartbeats: bytes out
+  virtual void start(Instant now) = 0;       // begins to connect
+  virtual void receive(Instant now) = 0;     // reads a bounded number of bytes and works on them
+  virtual void transmit(Instant now) = 0;    // time-outs, requests, heartbeats: bytes out
 
-  // Asks for one exposure. False unless state() is ready. Ids are chosen by the caller, each used for one
-  // exposure.
+  // Asks for one exposure. False unless state() is ready. Ids are chosen by the caller, each used for one exposure.
   virtual bool trigger(std::uint32_t shot_id, Instant now) = 0;
   virtual void forget_shot() = 0;  // the cell no longer wants the outstanding shot
 
   virtual std::optional<ScannerEvent> next_event() = 0;
   virtual ScannerState state() const = 0;
   virtual const ScannerInfo& info() const = 0;
-  virtual const Frame& frame() const = 0;  // the last accepted one; valid until the next trigger()
-  virtual std::uint64_t frame_offset()
-      const = 0;  // where its payload began in all bytes ever received on this link
-  virtual std::uint32_t frame_bytes() const = 0;  // the payload's size
-  virtual std::string_view why() const = 0;       // the last reason for being offline
+  virtual const Frame& frame() const = 0;          // the last accepted one; valid until the next trigger()
+  virtual std::uint64_t frame_offset() const = 0;  // where its payload began in all bytes ever received on this link
+  virtual std::uint32_t frame_bytes() const = 0;   // the payload's size
+  virtual std::string_view why() const = 0;        // the last reason for being offline
 };
 
 }  // namespace moldloft::hal

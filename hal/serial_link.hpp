@@ -1,11 +1,9 @@
 // A byte link over a serial port: libserialport underneath, 8N1, no flow control.
 //
-// A path outside /dev is handed to libserialport as /dev/../PATH: the library takes a port only by a name in
-// /dev. read() tells a silent line (0 bytes) from a port that is gone (state() turns lost) by polling the
-// handle for a hang-up.
+// A path outside /dev is handed to libserialport as /dev/../PATH: the library takes a port only by a name in /dev.
+// read() tells a silent line (0 bytes) from a port that is gone (state() turns lost) by polling the handle for a hang-up.
 //
-// Thread, blocking, allocation, failure: as ByteLink says. open() allocates; read(), write() and state() do
-// not.
+// Thread, blocking, allocation, failure: as ByteLink says. open() allocates; read(), write() and state() do not.
 #pragma once
 
 #include <memory>

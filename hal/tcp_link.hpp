@@ -1,9 +1,8 @@
 // A byte link over TCP, as client: standalone Asio underneath, its socket non-blocking, TCP_NODELAY set.
-// Connecting is a state that state() looks at, never a wait. Only numeric addresses and localhost names that
-// the resolver answers from its files are looked up, in open().
+// Connecting is a state that state() looks at, never a wait. Only numeric addresses and localhost names that the
+// resolver answers from its files are looked up, in open().
 //
-// Thread, blocking, allocation, failure: as ByteLink says. open() allocates; read(), write() and state() do
-// not.
+// Thread, blocking, allocation, failure: as ByteLink says. open() allocates; read(), write() and state() do not.
 #pragma once
 
 #include <cstdint>
