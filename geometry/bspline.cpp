@@ -26,8 +26,8 @@ int find_span(std::span<const double> knots, double t) {
 }
 
 BasisValues cubic_basis(std::span<const double> knots, int k, double t) {
-  // The recurrence raises the degree once a row: every entry is a sum of nonnegative terms inside the span, so nothing
-  // cancels. The rows of degree 1 and 2 give the derivatives by differences (thesis eq. 2.45).
+  // The recurrence raises the degree once a row: every entry is a sum of nonnegative terms inside the span,
+  // so nothing cancels. The rows of degree 1 and 2 give the derivatives by differences (thesis eq. 2.45).
   const double left1 = t - knots[k], left2 = t - knots[k - 1], left3 = t - knots[k - 2];
   const double right1 = knots[k + 1] - t, right2 = knots[k + 2] - t, right3 = knots[k + 3] - t;
 

@@ -6,7 +6,7 @@
 // Allocation   only where a vector is built or resized
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <span>
 #include <vector>

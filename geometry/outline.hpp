@@ -1,14 +1,14 @@
-// The plate's outline in plan view from all edge points that were seen: four corners, counter-clockwise, joined by four
-// smooth sides.
+// The plate's outline in plan view from all edge points that were seen: four corners, counter-clockwise,
+// joined by four smooth sides.
 //
-// Each edge point is given to the side whose chord it lies along, the sides are fitted as cubic B-spline curves by least
-// squares with Tukey's biweight (few control points: an edge is smooth, its noise is not), neighbouring sides are
-// extended to meet, and the meeting point is the corner.
+// Each edge point is given to the side whose chord it lies along, the sides are fitted as cubic B-spline
+// curves by least squares with Tukey's biweight (few control points: an edge is smooth, its noise is not),
+// neighbouring sides are extended to meet, and the meeting point is the corner.
 //
 // Frame        world, plan view (x, y), mm
-// Work         step() does one bounded piece (one pass over one side's points); the caller decides how many a tick
-// Allocation   in the constructor only
-// Failure      Error::not_four_sided, too_few_points (a side without points), collinear (sides that do not meet)
+// Work         step() does one bounded piece (one pass over one side's points); the caller decides how many a
+// tick Allocation   in the constructor only Failure      Error::not_four_sided, too_few_points (a side
+// without points), collinear (sides that do not meet)
 #pragma once
 
 #include <Eigen/Core>
@@ -25,13 +25,13 @@ struct Outline {
   std::array<Eigen::Vector2d, 4> corners;  // counter-clockwise
   // sides[i] runs from corners[i] to corners[(i + 1) % 4]; all four share one clamped uniform knot vector.
   std::array<PlanCurve, 4> sides;
-  double rms_mm = 0;                       // edge points about their sides, weighted
-  double max_mm = 0;                       // the largest residual among points that kept weight
+  double rms_mm = 0;  // edge points about their sides, weighted
+  double max_mm = 0;  // the largest residual among points that kept weight
 };
 
 struct OutlineSettings {
-  int spans = 4;            // of each side: 7 control points
-  double noise_mm = 0.1;    // of one edge point across the side: sampling, robot, noise
+  int spans = 4;                 // of each side: 7 control points
+  double noise_mm = 0.1;         // of one edge point across the side: sampling, robot, noise
   double corner_guard_mm = 1.0;  // points nearer than this to a corner belong to no side
 };
 
@@ -39,9 +39,10 @@ class OutlineBuilder {
  public:
   OutlineBuilder(std::size_t max_points, const OutlineSettings&);
 
-  // `corner_hints`: the tracker's corners, counter-clockwise, good to a few millimetres. The points are the caller's and
-  // must stay until the work is done.
-  std::expected<void, Error> begin(std::span<const Eigen::Vector2d> points, std::span<const Eigen::Vector2d> corner_hints);
+  // `corner_hints`: the tracker's corners, counter-clockwise, good to a few millimetres. The points are the
+  // caller's and must stay until the work is done.
+  std::expected<void, Error> begin(std::span<const Eigen::Vector2d> points,
+                                   std::span<const Eigen::Vector2d> corner_hints);
   std::expected<bool, Error> step();  // true when the outline is ready
   const Outline& outline() const { return outline_; }
   std::size_t bytes() const;

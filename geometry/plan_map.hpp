@@ -1,13 +1,15 @@
-// The plan map X(u, v) = (x, y): the bilinearly blended Coons patch of the outline's four sides (thesis eq. 2.65), and
-// its inverse. The plate is explicit (z over x, y), so a point's parameters are those of its plan position: safe where
-// projecting on a wavy base surface is not (field notes on the thesis's wave surface).
+// The plan map X(u, v) = (x, y): the bilinearly blended Coons patch of the outline's four sides (thesis
+// eq. 2.65), and its inverse. The plate is explicit (z over x, y), so a point's parameters are those of its
+// plan position: safe where projecting on a wavy base surface is not (field notes on the thesis's wave
+// surface).
 //
 // u runs along sides[0] (corner 0 to corner 1), v along sides[3] reversed (corner 0 to corner 3).
 //
 // Accuracy     the inverse satisfies |X(u, v) - (x, y)| <= 1e-10 mm
 // Cost         a point with a neighbour's (u, v) as guess: 2-3 Newton steps, about 0.3 us
 // Allocation   none in invert(); the constructor copies four curves
-// Failure      Error::folded_map from check(); outside_domain from invert() when the point lies off the plate by more
+// Failure      Error::folded_map from check(); outside_domain from invert() when the point lies off the plate
+// by more
 //              than the margin asked for
 #pragma once
 
@@ -35,8 +37,8 @@ class PlanMap {
   std::expected<Eigen::Vector2d, Error> invert(const Eigen::Vector2d& xy, const Eigen::Vector2d& guess,
                                                double margin = 0.0) const;
 
-  // The map as a bicubic B-spline net over knots that contain the sides' knots: exact, since every blend is bilinear in
-  // splines of degree 3. Fills x and y of `surface` for its knot vectors.
+  // The map as a bicubic B-spline net over knots that contain the sides' knots: exact, since every blend is
+  // bilinear in splines of degree 3. Fills x and y of `surface` for its knot vectors.
   void to_net(BSplineSurface& surface) const;
 
  private:
