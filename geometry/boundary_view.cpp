@@ -194,6 +194,13 @@ bool well_inside(const Eigen::Vector2d& p, const BoundaryViewSettings& settings)
          std::abs(p.y()) < settings.field_half_y_mm - reach;
 }
 
+// True when the few points that end with `last` do not simply leave the field, or lie so far apart that the
+// side runs almost along the stripes: the scanner sees more of it when it is turned.
+bool stub_hides(const EdgePoint& last, const EdgePoint& before, const BoundaryViewSettings& settings) {
+  const bool steep = (last.position - before.position).head<2>().norm() > 4 * settings.stripe_pitch_mm;
+  return steep || well_inside(last.position.head<2>(), settings);
+}
+
 // True when a piece stops although its direction would take it to the next stripe, and the one after, well
 // inside the field: its boundary turned away unseen, between stripes.
 bool vanishes(std::span<const EdgePoint> part, bool at_last, const BoundaryViewSettings& settings) {
@@ -269,14 +276,14 @@ void BoundaryViewer::describe(std::size_t begin, std::size_t end, bool hidden_fi
   // stub leads out of the field, the rest of the boundary hides between stripes.
   const std::size_t stub_last = corner_within(cuts[count - 2], end, 2);
   if (stub_last != 0 && end - stub_last < min_side) {
-    hidden_last |= well_inside(points_[end - 1].position.head<2>(), settings);
+    hidden_last |= stub_hides(points_[end - 1], points_[end - 2], settings);
     cuts[count - 1] = end = stub_last;
   } else {
     hidden_last |= vanishes(all.subspan(begin, end - begin), true, settings);
   }
   const std::size_t stub_first = corner_within(begin, cuts[1], 2);
   if (stub_first != 0 && stub_first - begin < min_side) {
-    hidden_first |= well_inside(points_[begin].position.head<2>(), settings);
+    hidden_first |= stub_hides(points_[begin], points_[begin + 1], settings);
     cuts[0] = begin = stub_first;
   } else {
     hidden_first |= vanishes(all.subspan(begin, end - begin), false, settings);
