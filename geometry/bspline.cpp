@@ -51,6 +51,28 @@ BasisValues cubic_basis(std::span<const double> knots, int k, double t) {
   return basis;
 }
 
+double greville(std::span<const double> knots, int i) {
+  return (knots[i + 1] + knots[i + 2] + knots[i + 3]) / 3;
+}
+
+double refined_coefficient(std::span<const double> coarse, std::span<const double> coefficients,
+                           std::span<const double> fine, int i) {
+  // De Boor's triangle with a different argument at every level evaluates the blossom of the piece that lies
+  // there.
+  const int k = find_span(coarse, 0.5 * (fine[i + 1] + fine[i + 3]));
+  std::array<double, 4> d;
+  for (int j = 0; j <= cubic; ++j) d[j] = coefficients[k - cubic + j];
+  for (int level = 1; level <= cubic; ++level) {
+    const double t = fine[i + level];
+    for (int j = cubic; j >= level; --j) {
+      const double low = coarse[k - cubic + j], high = coarse[k + 1 + j - level];
+      const double share = (t - low) / (high - low);
+      d[j] = (1 - share) * d[j - 1] + share * d[j];
+    }
+  }
+  return d[cubic];
+}
+
 CurvePoint2 PlanCurve::at(double t) const {
   t = std::clamp(t, knots[cubic], knots[knots.size() - cubic - 1]);
   const int k = find_span(knots, t);

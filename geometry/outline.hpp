@@ -13,8 +13,10 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
 #include <expected>
 #include <span>
+#include <vector>
 
 #include "geometry/bspline.hpp"
 #include "geometry/error.hpp"
@@ -38,6 +40,8 @@ struct OutlineSettings {
 class OutlineBuilder {
  public:
   OutlineBuilder(std::size_t max_points, const OutlineSettings&);
+  ~OutlineBuilder();
+  OutlineBuilder(OutlineBuilder&&) noexcept;
 
   // `corner_hints`: the tracker's corners, counter-clockwise, good to a few millimetres. The points are the
   // caller's and must stay until the work is done.
@@ -48,7 +52,25 @@ class OutlineBuilder {
   std::size_t bytes() const;
 
  private:
+  struct Side;
+  enum class Phase : std::uint8_t { idle, assign, sort, fit, corners, finish, done };
+
+  void assign_chunk();
+  std::expected<void, Error> sort_by_side();
+  std::expected<bool, Error> fit_pass();  // true when the side at hand is done
+  std::expected<void, Error> meet_corners();
+  void finish();
+
+  OutlineSettings settings_;
   Outline outline_;
+  std::span<const Eigen::Vector2d> points_;
+  std::vector<std::uint8_t> side_of_;  // of every point, 4 for none
+  std::vector<std::uint32_t> order_;   // points side by side
+  std::vector<double> residual_, scratch_;
+  std::vector<Side> sides_;  // four
+  Phase phase_ = Phase::idle;
+  std::size_t next_point_ = 0;
+  int round_ = 0, side_ = 0, pass_ = 0;
 };
 
 }  // namespace moldloft::geometry
