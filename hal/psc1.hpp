@@ -22,7 +22,7 @@ namespace moldloft::hal::psc1 {
 constexpr std::size_t header_size = 32;
 constexpr std::size_t payload_crc_size = 4;
 constexpr std::uint32_t max_payload = 8u << 20;  // a length beyond this is refused even under a valid header CRC
-constexpr std::uint8_t version = 1;
+constexpr std::uint8_t protocol_version = 1;
 constexpr std::uint16_t default_port = 4014;
 
 enum class Type : std::uint8_t {
@@ -46,10 +46,10 @@ struct Header {
   std::uint64_t acquired_ns = 0;  // sensor clock; 0 where nothing was acquired
 };
 
-struct HelloRequest { std::uint8_t version_min = version, version_max = version; };
+struct HelloRequest { std::uint8_t version_min = protocol_version, version_max = protocol_version; };
 struct HelloReply {
   Status status = Status::ok;
-  std::uint8_t version = 1;
+  std::uint8_t version = protocol_version;
   std::uint32_t session_id = 0;  // new at each power-up of the sensor
   std::uint16_t max_stripes = 0, max_points_per_stripe = 0;
   float field_x_mm = 0, field_y_mm = 0, depth_mm = 0;

@@ -48,6 +48,12 @@ struct Command {  // a host line
   std::uint32_t nonce = 0; // SYN
 };
 
+// What EVT says, unasked, once a second until the next SYN. Positive, so that they never meet V+'s own error
+// numbers, which are negative and pass through ERR and STA as they are.
+enum class Event : int { emergency_stop = 1, power_lost = 2, watchdog = 3, motion_failed = 4 };
+
+// An answer to a 0000 line has number 0, verb ack and the question in `answers`; on the wire it begins with the
+// question's own verb ("<0000 STA 1 0 0 2 0").
 struct Reply {  // a robot line
   int number = 0;
   Verb verb = Verb::ack;
@@ -66,6 +72,7 @@ std::string_view to_string(Flaw);
 
 std::uint16_t fletcher16(std::string_view text) noexcept;  // "abcde" gives 51440
 
+// With LF; empty if it cannot be said (not finite, or outside of what a field holds).
 Line format(const Command&) noexcept;
 Line format(const Reply&) noexcept;
 std::expected<Command, Flaw> parse_command(std::string_view line) noexcept;  // without CR and LF
