@@ -10,6 +10,14 @@
 
 namespace moldloft::host_sim {
 
+// Divisions would cost more than everything else, so the series' quotients stand here as numbers.
+inline constexpr double odd_reciprocals[] = {1.0,      1.0 / 3,  1.0 / 5,  1.0 / 7,  1.0 / 9, 1.0 / 11,
+                                             1.0 / 13, 1.0 / 15, 1.0 / 17, 1.0 / 19, 1.0 / 21};
+inline constexpr double sine_ratios[] = {-1.0 / 6,   -1.0 / 20,  -1.0 / 42,  -1.0 / 72,
+                                         -1.0 / 110, -1.0 / 156, -1.0 / 210, -1.0 / 272};
+inline constexpr double cosine_ratios[] = {-1.0 / 2,   -1.0 / 12,  -1.0 / 30,  -1.0 / 56, -1.0 / 90,
+                                           -1.0 / 132, -1.0 / 182, -1.0 / 240, -1.0 / 306};
+
 // Natural logarithm of a positive, finite, normal number.
 inline double portable_log(double x) noexcept {
   constexpr double ln2 = 0.69314718055994530942;
@@ -22,7 +30,7 @@ inline double portable_log(double x) noexcept {
   // log(m) = 2 artanh(s), s = (m - 1) / (m + 1), |s| <= 0.172: eleven terms of the odd series reach 1e-17.
   const double s = (mantissa - 1.0) / (mantissa + 1.0), s2 = s * s;
   double series = 0.0;
-  for (int k = 21; k >= 1; k -= 2) series = series * s2 + 1.0 / k;
+  for (int k = 10; k >= 0; --k) series = series * s2 + odd_reciprocals[k];
   return exponent * ln2 + 2.0 * s * series;
 }
 
@@ -39,8 +47,8 @@ inline SineCosine portable_sin_cos(double x) noexcept {
   // Taylor by Horner, sin r = r (1 - r2/6 (1 - r2/20 (...))); |r| <= pi/4: the first term left out is below
   // 1e-17.
   double s = 0.0, c = 0.0;
-  for (int n = 17; n >= 3; n -= 2) s = -(1.0 + s) * r2 / (n * (n - 1));
-  for (int n = 18; n >= 2; n -= 2) c = -(1.0 + c) * r2 / (n * (n - 1));
+  for (int k = 7; k >= 0; --k) s = (1.0 + s) * r2 * sine_ratios[k];
+  for (int k = 8; k >= 0; --k) c = (1.0 + c) * r2 * cosine_ratios[k];
   const double sine = r + r * s, cosine = 1.0 + c;
   switch (static_cast<long long>(k) & 3) {
     case 0:
