@@ -1,0 +1,70 @@
+// What the simulation asks of a robot arm: four joints, a tip whose z axis points straight down, poses as the
+// robot's wire writes them (tip in world, V+'s ZYZ' angles, pitch 180 degrees).
+//
+// A new make of arm is one more of these; what moves it (arm_drive.hpp) knows only this.
+//
+// Units        mm, rad
+// Thread       one thread
+// Allocation   at construction only
+// Failure      std::expected with an error number and one line that names joint and limit
+#pragma once
+
+#include <expected>
+#include <memory>
+#include <string_view>
+
+#include "geometry/rigid_motion.hpp"
+#include "hal/fixed_text.hpp"
+#include "hal/pose.hpp"
+#include "host_sim/joint_motion.hpp"
+
+namespace moldloft::host_sim {
+
+// Error numbers that the robot server sends on, in the ranges where V+ has its own for the same.
+constexpr int error_location_too_close = -618;
+constexpr int error_location_too_far = -617;
+constexpr int error_location_out_of_range = -610;  // a joint beyond its limit, a tip that does not point down
+constexpr int error_not_calibrated = -605;
+constexpr int error_no_power = -604;
+constexpr int error_emergency_stop = -643;
+constexpr int error_stopped = -400;  // motion ended before its target: STP, SYN or watchdog
+constexpr int error_watchdog = -401;
+
+struct MotionError {
+  int code = 0;
+  hal::Message text;
+};
+
+class Arm {
+ public:
+  virtual ~Arm() = default;
+
+  virtual std::string_view name() const = 0;
+  virtual const JointLimits& limits() const = 0;
+  virtual Joints home() const = 0;
+
+  // The joints that bring the tip there, turned the shortest way from where the arm stands.
+  virtual std::expected<Joints, MotionError> joints_for(const hal::Pose& tip,
+                                                        const Joints& standing_at) const = 0;
+
+  // Where the tip is if the arm were as its controller believes, and where it truly is.
+  virtual geometry::RigidMotion world_from_tip(const Joints&) const = 0;
+  virtual geometry::RigidMotion true_world_from_tip(const Joints&) const = 0;
+};
+
+// The motion from joints to pose, or why there is none.
+std::expected<JointMotion, MotionError> plan_motion(const Arm&, const Joints& from, const hal::Pose& to,
+                                                    double speed_percent);
+
+geometry::RigidMotion motion_of(const hal::Pose&);
+// Yaw 0, pitch 180 degrees, roll carries the turn (geometry::zyz_from_rotation); rounded to the wire's 0.001
+// mm and 0.001 degree, as encoders are read.
+hal::Pose pose_of(const geometry::RigidMotion&);
+
+// The turn of a tip that points straight down about world z: its x axis in plan. Fails for any other tip.
+std::expected<double, MotionError> heading_of(const hal::Pose&);
+
+// The first joint that is outside its limits, as an error; nothing when all are inside.
+std::expected<void, MotionError> check_limits(const JointLimits&, const Joints&);
+
+}  // namespace moldloft::host_sim

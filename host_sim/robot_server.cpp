@@ -1,0 +1,240 @@
+#include "host_sim/robot_server.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace moldloft::host_sim {
+
+namespace robot_line = hal::robot_line;
+using robot_line::Refusal;
+using robot_line::Reply;
+using robot_line::Verb;
+
+RobotServer::RobotServer(hal::ByteLink& link, ArmDrive drive, const RobotTimes& times)
+    : link_(link), drive_(std::move(drive)), times_(times) {}
+
+void RobotServer::step(hal::Instant now) {
+  if (link_.state() == hal::LinkState::open) {
+    connected_ = true;
+    receive(now);
+  } else {
+    connected_ = false;
+    line_used_ = out_used_ = 0;
+    if (link_.state() != hal::LinkState::opening) link_.open();
+  }
+  watch(now);
+  if (fate_ == Fate::under_way && now >= busy_until_) finish_work(now);
+  flush();
+}
+
+void RobotServer::power_cycle(hal::Instant now) {
+  drive_.stop(now);
+  if (fate_ == Fate::under_way) busy_until_ = stands_at_ = drive_.stands_at();
+  fate_ = Fate::none;
+  synchronised_ = calibrated_ = calibrating_ = false;
+  last_number_ = last_error_ = 0;
+  line_used_ = out_used_ = 0;
+}
+
+void RobotServer::press_emergency_stop(hal::Instant now) {
+  emergency_stop_ = true;
+  last_error_ = error_emergency_stop;
+  abort_work(error_emergency_stop, now);
+  synchronised_ = false;
+  report_event(error_emergency_stop);
+}
+
+void RobotServer::receive(hal::Instant now) {
+  std::array<std::byte, 256> bytes;
+  while (const std::size_t count = link_.read(bytes)) {
+    for (std::size_t k = 0; k < count; ++k) {
+      const char c = static_cast<char>(bytes[k]);
+      if (c == '\n') {
+        last_line_ = now;
+        if (line_too_long_) {
+          refuse(0, Refusal::checksum);
+        } else if (line_used_ > 0) {
+          take_line({line_.data(), line_used_}, now);
+        }
+        line_used_ = 0;
+        line_too_long_ = false;
+      } else if (c == '\r') {
+        continue;
+      } else if (line_used_ < robot_line::max_length) {
+        line_[line_used_++] = c;
+      } else {
+        line_too_long_ = true;
+      }
+    }
+  }
+}
+
+void RobotServer::take_line(std::string_view line, hal::Instant now) {
+  ++counters_.lines;
+  const auto command = robot_line::parse_command(line);
+  if (!command) return refuse(0, Refusal::checksum);
+  if (command->number == 0) return answer_question(*command, now);
+  take_numbered(*command, now);
+}
+
+void RobotServer::answer_question(const robot_line::Command& question, hal::Instant now) {
+  Reply reply;
+  reply.answers = question.verb;
+  switch (question.verb) {
+    case Verb::syn:
+      // A host that begins anew knows nothing of a motion still under way: it must not go on behind its back.
+      abort_work(error_stopped, now);
+      fate_ = Fate::none;
+      last_number_ = 0;
+      executions_.fill(0);
+      synchronised_ = !emergency_stop_ && power_;
+      reply.nonce = question.nonce;
+      break;
+    case Verb::sta:
+      reply.status.power = power_ && !emergency_stop_;
+      reply.status.emergency_stop = emergency_stop_;
+      reply.status.moving = drive_.moving(now) || (calibrating_ && now < busy_until_);
+      reply.status.mode =
+          calibrated_ ? robot_line::Status::Mode::calibrated : robot_line::Status::Mode::automatic;
+      reply.status.last_error = last_error_;
+      break;
+    case Verb::pos:
+      reply.pose = drive_.reported_pose(now);
+      reply.has_pose = true;
+      break;
+    case Verb::stp:
+      abort_work(error_stopped, now);
+      break;
+    default:
+      break;  // PNG says only that both are there
+  }
+  send(reply);
+}
+
+void RobotServer::take_numbered(const robot_line::Command& command, hal::Instant now) {
+  if (!synchronised_) return refuse(command.number, Refusal::not_synchronised);
+  if (command.number == last_number_) {
+    ++counters_.repeats;
+    return send_fate();
+  }
+  const bool is_next = command.number == robot_line::next_number(last_number_);
+  if (!is_next || fate_ == Fate::under_way) return refuse(command.number, Refusal::sequence);
+  last_number_ = command.number;
+  execute(command, now);
+  send_fate();
+}
+
+void RobotServer::execute(const robot_line::Command& command, hal::Instant now) {
+  const auto failed = [this](int code) {
+    fate_ = Fate::failed;
+    fate_code_ = last_error_ = code;
+  };
+  if (emergency_stop_ || !power_) return failed(emergency_stop_ ? error_emergency_stop : error_no_power);
+  if (drive_.moving(now)) return failed(error_stopped);  // still braking after STP or SYN
+  if (command.verb == Verb::cal) {
+    ++counters_.calibrations;
+    calibrating_ = true;
+    return begin_work(now, now + times_.calibration, now + times_.calibration);
+  }
+  if (!calibrated_) return failed(error_not_calibrated);
+  if (const auto started = drive_.start(command.pose, command.speed_percent, now); !started) {
+    return failed(started.error().code);
+  }
+  ++counters_.motions;
+  counters_.most_executions =
+      std::max(counters_.most_executions, ++executions_[static_cast<std::size_t>(command.number)]);
+  begin_work(now, drive_.stands_at(), drive_.settled_at());
+}
+
+void RobotServer::begin_work(hal::Instant now, hal::Instant stands_at, hal::Instant until) {
+  fate_ = Fate::under_way;
+  busy_from_ = now;
+  stands_at_ = stands_at;
+  busy_until_ = until;
+}
+
+void RobotServer::finish_work(hal::Instant now) {
+  calibrated_ |= calibrating_;
+  calibrating_ = false;
+  fate_ = Fate::done;
+  fate_pose_ = drive_.reported_pose(now);
+  ++commands_done_;
+  send_fate();
+}
+
+// Ends what is under way, where the brakes bring it to stand; its number is answered by ERR from now on.
+void RobotServer::abort_work(int code, hal::Instant now) {
+  if (fate_ != Fate::under_way) return;
+  drive_.stop(now);
+  stands_at_ = busy_until_ = calibrating_ ? now : drive_.stands_at();
+  calibrating_ = false;
+  fate_ = Fate::failed;
+  fate_code_ = last_error_ = code;
+  ++commands_done_;
+  send_fate();
+}
+
+void RobotServer::watch(hal::Instant now) {
+  if (!synchronised_ || now - last_line_ < times_.watchdog) return;
+  ++counters_.watchdogs;
+  abort_work(error_stopped, now);
+  synchronised_ = false;
+  last_error_ = error_watchdog;
+  report_event(error_watchdog);
+}
+
+void RobotServer::send_fate() {
+  Reply reply;
+  reply.number = last_number_;
+  switch (fate_) {
+    case Fate::none:
+      return;
+    case Fate::under_way:
+      reply.verb = Verb::ack;
+      break;
+    case Fate::done:
+      reply.verb = Verb::don;
+      reply.pose = fate_pose_;
+      reply.has_pose = true;
+      break;
+    case Fate::failed:
+      reply.verb = Verb::err;
+      reply.code = fate_code_;
+      break;
+  }
+  send(reply);
+}
+
+void RobotServer::refuse(int number, Refusal refusal) {
+  ++counters_.refused;
+  Reply reply;
+  reply.number = number;
+  reply.verb = Verb::nak;
+  reply.refusal = refusal;
+  reply.last_number = last_number_;
+  send(reply);
+}
+
+void RobotServer::report_event(int code) {
+  Reply reply;
+  reply.verb = Verb::evt;
+  reply.code = code;
+  send(reply);
+}
+
+// A line that does not fit is left out whole: the host asks again for what it misses.
+void RobotServer::send(const Reply& reply) {
+  const auto line = robot_line::format(reply);
+  const std::string_view text = line.view();
+  if (!connected_ || out_used_ + text.size() > out_.size()) return;
+  text.copy(out_.data() + out_used_, text.size());
+  out_used_ += text.size();
+}
+
+void RobotServer::flush() {
+  const std::size_t taken = link_.write(std::as_bytes(std::span{out_}.first(out_used_)));
+  std::memmove(out_.data(), out_.data() + taken, out_used_ - taken);
+  out_used_ -= taken;
+}
+
+}  // namespace moldloft::host_sim
