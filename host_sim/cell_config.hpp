@@ -1,0 +1,20 @@
+// The controller's configuration for a simulated cell: what the people who set such a cell up would write into its
+// cell.toml. They know the arm, the nominal mount and about where a plate is laid; they do not know the truth.
+#pragma once
+
+#include <expected>
+#include <string>
+
+#include "firmware_like/config.hpp"
+#include "host_sim/cell_description.hpp"
+
+namespace moldloft::host_sim {
+
+struct CellAddresses {
+  std::uint16_t scanner_port = hal::psc1::default_port;
+  std::string robot_device = "/dev/ttyS0";
+};
+
+std::string cell_toml(const CellDescription&, const PlateInstance&, const CellAddresses& = {});
+
+}  // namespace moldloft::host_sim

@@ -1,0 +1,108 @@
+#include "host_sim/simulated_run.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "firmware_like/run_command.hpp"
+#include "hal/cable.hpp"
+#include "host_sim/cell_config.hpp"
+
+namespace moldloft::host_sim {
+namespace {
+
+using firmware_like::Controller;
+using firmware_like::Json;
+
+constexpr double serial_bytes_per_second = 11520;  // 115200 baud, 8N1
+constexpr int ticks_between_drains = 10;
+constexpr int ticks_between_reports = 200;
+
+// Virtual time that carries the simulated devices along.
+class WorldClock final : public hal::VirtualClock {
+ public:
+  void carry(SimulatedWorld& world) { world_ = &world; }
+
+ protected:
+  void advance(hal::Instant wake) noexcept override {
+    if (world_ != nullptr) world_->step(wake);
+  }
+
+ private:
+  SimulatedWorld* world_ = nullptr;
+};
+
+Json truth_json(const Verdict& v) {
+  return {{"normal_max_mm", v.normal_max_mm}, {"normal_rms_mm", v.normal_rms_mm}, {"outline_max_mm", v.outline_max_mm},
+          {"corner_max_mm", v.corner_max_mm}, {"points", v.points}};
+}
+
+// The judge's grid lies on the true plate, the picture's cells on the measured surface: each cell shows the grid point
+// nearest to its middle.
+firmware_like::PlateField error_field(const Verdict& verdict, const geometry::BSplineSurface& surface, int count) {
+  firmware_like::PlateField field;
+  field.count_u = field.count_v = count;
+  field.title = "Measured minus true surface, along the normal";
+  field.unit = "um";
+  field.scale = 1000;
+  for (int i = 0; i < count; ++i) {
+    for (int k = 0; k < count; ++k) {
+      const Eigen::Vector3d p = surface.at((i + 0.5) / count, (k + 0.5) / count).value;
+      double nearest = INFINITY, value = NAN;
+      for (const auto& d : verdict.grid) {
+        const double distance = (d.world - p.head<2>()).squaredNorm();
+        if (distance >= nearest) continue;
+        nearest = distance;
+        value = d.normal_mm;
+      }
+      field.values.push_back(value);
+    }
+  }
+  return field;
+}
+
+void run_to_rest(Controller& controller, hal::RunStore& store, hal::Clock& clock, const SimulatedRunOptions& options) {
+  controller.start();
+  for (int ticks = 1; controller.tick() && clock.now() < options.time_limit; ++ticks) {
+    if (ticks % ticks_between_drains == 0) controller.recorder().drain(store);
+    if (options.on_progress && ticks % ticks_between_reports == 0) options.on_progress(controller.cell().progress());
+  }
+  controller.recorder().drain(store);
+  if (options.on_progress) options.on_progress(controller.cell().progress());
+}
+
+}  // namespace
+
+std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& options) {
+  const auto plate = placed_plate(options.cell);
+  if (!plate) return std::unexpected{plate.error()};
+  const std::string text = cell_toml(options.cell, *plate);
+  const auto config = firmware_like::parse_config(text, "simulated cell");
+  if (!config) return std::unexpected{SimError{config.error().what}};
+  auto folder = firmware_like::create_run(options.out, text, firmware_like::RunKind::simulated);
+  if (!folder) return std::unexpected{SimError{folder.error().what}};
+
+  WorldClock clock;
+  hal::Cable scanner_cable{clock, {}}, robot_cable{clock, {.bytes_per_second = serial_bytes_per_second}};
+  SimulatedWorld world{options.cell, *plate, scanner_cable.device(), robot_cable.device()};
+  clock.carry(world);
+  const auto controller = std::make_unique<Controller>(*config, clock, scanner_cable.host(), robot_cable.host());
+  run_to_rest(*controller, *folder->store, clock, options);
+
+  const firmware_like::RunLabel label{.plate = plate->plate->name(), .seed = options.cell.seed};
+  SimulatedRun run{.summary = summary_of(*controller, label), .exit_code = firmware_like::exit_code(*controller)};
+  std::optional<firmware_like::PlateField> errors;
+  if (controller->cell().state() == tasks::CellState::complete) {
+    const auto verdict = judge(*plate, controller->surface().fit().surface(), controller->surface().outline().corners);
+    if (!verdict) return std::unexpected{verdict.error()};
+    run.summary["truth"] = truth_json(*verdict);
+    if (options.write_everything) errors = error_field(*verdict, controller->surface().fit().surface(), 56);
+  }
+  if (options.write_everything) {
+    const auto written = write_results(*controller, *folder, label, run.summary, errors);
+    if (!written) return std::unexpected{SimError{written.error().what}};
+  }
+  return run;
+}
+
+}  // namespace moldloft::host_sim
