@@ -317,8 +317,14 @@ struct Neighbour {
          rise_mm = 0;  // to the next run on the stripe; how much higher it lies than this one goes on
 };
 
-RunEnd kind_of_end(double y_outward, const Neighbour& beyond, const PlateRunSettings& settings) {
-  if (y_outward >= settings.field_half_y_mm - settings.field_margin_mm) return RunEnd::field_limit;
+// A stripe that reports every ray ends at the field's limit whatever the plate's height does to its width there;
+// one that leaves missing points out ends there by its position.
+bool at_field_limit(double y_outward, std::size_t rays_beyond, double spacing, const PlateRunSettings& settings) {
+  return static_cast<double>(rays_beyond) * spacing <= settings.field_margin_mm ||
+         y_outward >= settings.field_half_y_mm - settings.field_margin_mm;
+}
+
+RunEnd kind_of_end(const Neighbour& beyond, const PlateRunSettings& settings) {
   if (!beyond.exists) return RunEnd::free_end;
   if (beyond.gap_mm <= settings.bridge_mm) return beyond.rise_mm > 0 ? RunEnd::hidden : RunEnd::step_down;
   // Behind a gap: something that towers over the plate throws a shadow on it; anything else leaves the edge
@@ -375,8 +381,13 @@ std::expected<std::span<const PlateRun>, Error> PlateRunFinder::find(std::span<c
       return Neighbour{true, gap, far.z_at(y) - line.z_at(y)};
     };
     const bool below = i > first_run_[run.stripe], above = i + 1 < first_run_[run.stripe + 1u];
-    out.at_first = kind_of_end(-run.y_first, below ? neighbour(i - 1, false) : Neighbour{}, settings);
-    out.at_last = kind_of_end(run.y_last, above ? neighbour(i + 1, true) : Neighbour{}, settings);
+    const std::size_t rays_above = stripe.z.size() - 1 - out.last;
+    const bool low_limit = at_field_limit(-run.y_first, out.first, spacing_near_end(stripe, good, false), settings);
+    const bool high_limit = at_field_limit(run.y_last, rays_above, spacing_near_end(stripe, good, true), settings);
+    out.at_first = low_limit ? RunEnd::field_limit
+                             : kind_of_end(below ? neighbour(i - 1, false) : Neighbour{}, settings);
+    out.at_last =
+        high_limit ? RunEnd::field_limit : kind_of_end(above ? neighbour(i + 1, true) : Neighbour{}, settings);
     found_.push_back(out);
   }
   return std::span<const PlateRun>(found_);
