@@ -39,6 +39,7 @@ struct SurfaceFitReport {
   double smallest_pivot = 0;   // relative to the largest: small means a badly determined control point
   int empty_cells = 0;         // of the chosen net
   double shot_offset_rms_mm = 0, shot_offset_max_mm = 0;
+  int shots_without_offset = 0;  // taken as exact, since the memory plan had no room for their moments
 };
 
 class SurfaceFit {
