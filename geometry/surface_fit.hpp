@@ -28,7 +28,8 @@ struct SurfaceFitSettings {
   int max_spans_u = 32, max_spans_v = 32;  // finest net, powers of two, at least 4
   int max_shots = 64;
   double shot_sigma_mm = 0.013;  // 0: shots are taken as exact
-  double fairing = 1e-9;         // relative to the data's weight
+  double noise_mm = 0;           // of a point of weight 1; 0: estimated from the finest net's residual
+  double fairing = 1e-8;         // relative to the data: the ratio of the matrices' traces
 };
 
 struct SurfaceFitReport {
@@ -39,6 +40,7 @@ struct SurfaceFitReport {
   double smallest_pivot = 0;   // relative to the largest: small means a badly determined control point
   int empty_cells = 0;         // of the chosen net
   double shot_offset_rms_mm = 0, shot_offset_max_mm = 0;
+  int shots_without_offset = 0;  // taken as exact, since the memory plan had no room for their moments
 };
 
 class SurfaceFit {
