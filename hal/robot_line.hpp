@@ -43,7 +43,7 @@ struct Status {
 struct Command {  // a host line
   int number = 0;
   Verb verb = Verb::png;
-  Pose pose;               // MOV
+  Pose pose{};             // MOV
   int speed_percent = 0;   // MOV
   std::uint32_t nonce = 0; // SYN
 };
@@ -52,12 +52,15 @@ struct Command {  // a host line
 // numbers, which are negative and pass through ERR and STA as they are.
 enum class Event : int { emergency_stop = 1, power_lost = 2, watchdog = 3, motion_failed = 4 };
 
+// What ERR says where the controller has no number of its own for it.
+enum class Error : int { out_of_reach = 1, bad_value = 2, not_calibrated = 3, stopped = 4, arm_off = 5 };
+
 // An answer to a 0000 line has number 0, verb ack and the question in `answers`; on the wire it begins with the
 // question's own verb ("<0000 STA 1 0 0 2 0").
 struct Reply {  // a robot line
   int number = 0;
   Verb verb = Verb::ack;
-  Pose pose;                // DON, and the answer to POS
+  Pose pose{};              // DON, and the answer to POS
   bool has_pose = false;
   Verb answers = Verb::ack; // for 0000 lines: which question is answered (syn, png, sta, pos, stp)
   Status status;            // STA

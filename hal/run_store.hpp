@@ -41,6 +41,7 @@ class RunStore {
   std::expected<void, StoreError> write(const EventRecord&);
   std::expected<void, StoreError> write(const ShotRecord&);
   std::expected<void, StoreError> commit();
+  void roll_back() noexcept;  // of what begin() began; nothing if nothing did
   std::expected<void, StoreError> set_meta(std::string_view key, std::string_view value);
 
   // ---- reading

@@ -49,12 +49,13 @@ class TcpLink final : public ByteLink {
 
   void open() override {
     close();
-    const auto address = find_address(host_);
-    if (!address) {
+    // Looked up once: reading the hosts file is disk and heap, and a reconnect happens between two ticks.
+    if (!address_) address_ = find_address(host_);
+    if (!address_) {
       lose("'{}' is neither an address nor a name in /etc/hosts: write the address in numbers", host_);
       return;
     }
-    const tcp::endpoint peer{*address, port_};
+    const tcp::endpoint peer{*address_, port_};
     asio::error_code error;
     socket_.open(peer.protocol(), error);
     if (!error) socket_.non_blocking(true, error);
@@ -161,6 +162,7 @@ class TcpLink final : public ByteLink {
 
   std::string host_;
   std::uint16_t port_;
+  std::optional<asio::ip::address> address_;
   asio::io_context context_{1};  // Asio wants one; nothing ever runs in it
   tcp::socket socket_{context_};
   LinkState state_ = LinkState::closed;

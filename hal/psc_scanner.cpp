@@ -1,0 +1,462 @@
+#include "hal/psc_scanner.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <utility>
+
+namespace moldloft::hal {
+
+using namespace psc1;
+
+namespace {
+
+// A FRAME payload of this many stripes and points in the larger encoding, with its CRC (PROTOCOLS.md,
+// "FRAME").
+constexpr std::size_t largest_body(std::uint32_t stripes, std::uint32_t points) {
+  return 48 + std::size_t{12} * stripes + std::size_t{13} * points + payload_crc_size;
+}
+
+// Everything that is not a FRAME fits into this, whatever the limits of a frame are.
+constexpr std::size_t smallest_body = 4096;
+
+}  // namespace
+
+struct PscScanner::Transition {
+  Phase from;
+  Cue cue;
+  bool (PscScanner::*guard)() const;
+  void (PscScanner::*action)(Instant);
+  Phase to;
+};
+
+using D = PscScanner;
+
+// First match counts; a pair that is not listed is ignored (a late answer to a question that nobody asks any
+// more).
+// clang-format off
+const PscScanner::Transition PscScanner::transitions[] = {
+    // from              cue                guard             action                    to
+    {Phase::idle,        Cue::start,        &D::always,       &D::open_link,            Phase::opening},
+    {Phase::waiting,     Cue::wait_over,    &D::always,       &D::open_link,            Phase::opening},
+    {Phase::opening,     Cue::link_open,    &D::always,       &D::greet,                Phase::greeting},
+    {Phase::greeting,    Cue::greeted,      &D::always,       &D::configure,            Phase::configuring},
+    {Phase::configuring, Cue::configured,   &D::shot_waits,   &D::announce_and_trigger, Phase::exposing},
+    {Phase::configuring, Cue::configured,   &D::frame_waits,  &D::announce_and_trigger, Phase::computing},
+    {Phase::configuring, Cue::configured,   &D::shot_is_void, &D::announce_and_fail,    Phase::ready},
+    {Phase::configuring, Cue::configured,   &D::always,       &D::announce,             Phase::ready},
+    {Phase::ready,       Cue::triggered,    &D::always,       &D::send_trigger,         Phase::exposing},
+    {Phase::exposing,    Cue::exposed,      &D::always,       &D::report_exposed,       Phase::computing},
+    {Phase::exposing,    Cue::frame,        &D::always,       &D::report_both,          Phase::ready},
+    {Phase::exposing,    Cue::late,         &D::has_retries,  &D::send_trigger,         Phase::exposing},
+    {Phase::exposing,    Cue::late,         &D::always,       &D::fail_shot,            Phase::ready},
+    {Phase::exposing,    Cue::exposed_anew, &D::always,       &D::fail_shot,            Phase::ready},
+    {Phase::exposing,    Cue::forgotten,    &D::always,       &D::drop_shot,            Phase::ready},
+    {Phase::computing,   Cue::frame,        &D::always,       &D::report_frame,         Phase::ready},
+    {Phase::computing,   Cue::late,         &D::has_retries,  &D::send_trigger,         Phase::computing},
+    {Phase::computing,   Cue::late,         &D::always,       &D::fail_shot,            Phase::ready},
+    {Phase::computing,   Cue::exposed_anew, &D::always,       &D::fail_shot,            Phase::ready},
+    {Phase::computing,   Cue::forgotten,    &D::always,       &D::drop_shot,            Phase::ready},
+    {Phase::opening,     Cue::link_lost,    &D::always,       &D::back_off,             Phase::waiting},
+    {Phase::greeting,    Cue::link_lost,    &D::always,       &D::back_off,             Phase::waiting},
+    {Phase::configuring, Cue::link_lost,    &D::always,       &D::back_off,             Phase::waiting},
+    {Phase::ready,       Cue::link_lost,    &D::always,       &D::report_loss,          Phase::waiting},
+    {Phase::exposing,    Cue::link_lost,    &D::always,       &D::report_loss,          Phase::waiting},
+    {Phase::computing,   Cue::link_lost,    &D::always,       &D::report_loss,          Phase::waiting},
+};
+// clang-format on
+
+PscScanner::PscScanner(ByteLink& link, const Settings& settings)
+    : link_{link},
+      settings_{settings},
+      body_(std::max(largest_body(settings.max_stripes, settings.max_points), smallest_body)),
+      frame_{settings.max_stripes, settings.max_points} {
+  assert(settings.bytes_a_tick >= header_size && settings.silent_pings >= 1 && settings.retries >= 0);
+}
+
+std::size_t PscScanner::plan_bytes() const {
+  return sizeof *this + body_.size() + frame_.stripes.size() * sizeof(Stripe) +
+         frame_.x.size() * (3 * sizeof(float) + sizeof(std::uint8_t));
+}
+
+void PscScanner::cue(Cue what, Instant now) {
+  for (const Transition& t : transitions) {
+    if (t.from != phase_ || t.cue != what || !(this->*t.guard)()) continue;
+    phase_ = t.to;
+    (this->*t.action)(now);
+    return;
+  }
+}
+
+// ---- what the cell asks
+
+void PscScanner::start(Instant now) { cue(Cue::start, now); }
+
+bool PscScanner::trigger(std::uint32_t shot_id, Instant now) {
+  if (phase_ != Phase::ready) return false;
+  shot_ = {.id = shot_id, .outstanding = true};
+  cue(Cue::triggered, now);
+  return true;
+}
+
+void PscScanner::forget_shot() {
+  shot_.outstanding = false;
+  cue(Cue::forgotten, Instant{});
+}
+
+ScannerState PscScanner::state() const {
+  switch (phase_) {
+    case Phase::idle:
+    case Phase::waiting:
+    case Phase::opening:
+      return ScannerState::offline;
+    case Phase::greeting:
+    case Phase::configuring:
+      return ScannerState::greeting;
+    case Phase::ready:
+      return ScannerState::ready;
+    case Phase::exposing:
+      return ScannerState::exposing;
+    case Phase::computing:
+      return ScannerState::computing;
+  }
+  return ScannerState::offline;
+}
+
+// ---- actions of the table
+
+void PscScanner::open_link(Instant now) {
+  incoming_ = {};
+  outgoing_size_ = 0;
+  deadline_ = now + settings_.connect_timeout;
+  link_.open();
+}
+
+void PscScanner::back_off(Instant now) {
+  link_.close();
+  ask_again_at_.reset();
+  back_off_ = back_off_ == 0ns ? settings_.first_back_off : std::min(2 * back_off_, settings_.last_back_off);
+  wait_until_ = now + back_off_;
+}
+
+void PscScanner::report_loss(Instant now) {
+  failure_ = why_;
+  if (std::exchange(announced_, false))
+    events_.push({ScannerEvent::Kind::lost, shot_.outstanding ? shot_.id : 0, why_});
+  back_off(now);
+}
+
+void PscScanner::greet(Instant now) {
+  heard_at_ = now;
+  deadline_ = now + settings_.greeting_timeout;
+  send(HelloRequest{});
+}
+
+void PscScanner::configure(Instant now) {
+  deadline_ = now + settings_.greeting_timeout;
+  send(Config{.encoding = settings_.encoding, .intensity = settings_.intensity});
+}
+
+void PscScanner::announce(Instant now) {
+  back_off_ = 0ns;
+  pinged_at_ = now;
+  announced_ = true;
+  why_ = "";
+  events_.push({ScannerEvent::Kind::ready, 0, {}});
+}
+
+void PscScanner::announce_and_trigger(Instant now) {
+  announce(now);
+  send_trigger(now);
+}
+
+void PscScanner::announce_and_fail(Instant now) {
+  announce(now);
+  if (shot_.exposed && !same_session()) {
+    failure_ = "the scanner restarted between EXPOSED and FRAME; the arm may have moved since";
+  }
+  fail_shot(now);
+}
+
+void PscScanner::send_trigger(Instant now) {
+  ++shot_.attempts;
+  ask_again_at_.reset();
+  deadline_ = now + (phase_ == Phase::exposing ? settings_.exposure_timeout : settings_.frame_timeout);
+  send(Trigger{.shot_id = shot_.id});
+}
+
+void PscScanner::report_exposed(Instant now) {
+  shot_.exposed = true;
+  shot_.exposed_request = incoming_.head.request_id;
+  shot_.session_id = info_.session_id;
+  deadline_ = now + settings_.frame_timeout;
+  events_.push({ScannerEvent::Kind::exposed, shot_.id, {}});
+}
+
+void PscScanner::report_frame(Instant) {
+  shot_.outstanding = false;
+  ask_again_at_.reset();
+  events_.push({ScannerEvent::Kind::frame, shot_.id, {}});
+}
+
+void PscScanner::report_both(Instant now) {
+  report_exposed(now);
+  report_frame(now);
+}
+
+void PscScanner::fail_shot(Instant) {
+  shot_.outstanding = false;
+  ask_again_at_.reset();
+  events_.push({ScannerEvent::Kind::shot_failed, shot_.id, failure_});
+}
+
+void PscScanner::drop_shot(Instant) { ask_again_at_.reset(); }
+
+// ---- what arrives
+
+void PscScanner::receive(Instant now) {
+  if (phase_ == Phase::idle || phase_ == Phase::waiting) return;
+  if (link_.state() == LinkState::lost) {
+    lose(now, link_.why());
+    return;
+  }
+  if (phase_ == Phase::opening) {
+    if (link_.state() == LinkState::open) cue(Cue::link_open, now);
+    return;
+  }
+  for (std::size_t budget = settings_.bytes_a_tick; budget > 0;) {
+    const std::size_t count = read_some(budget);
+    if (count == 0) break;
+    heard_at_ = now;
+    budget -= count;
+    if (incoming_.header_have < header_size) continue;
+    if (incoming_.payload_offset == 0 && !take_header(now)) return;
+    const std::size_t body_size =
+        incoming_.head.payload_length == 0 ? 0 : incoming_.head.payload_length + payload_crc_size;
+    if (incoming_.body_have < body_size) continue;
+    take_message(now);
+    if (phase_ == Phase::waiting) return;  // the message was the connection's last
+    incoming_ = {};
+  }
+}
+
+// Reads what is missing of the header, or of the body, and never beyond: nothing is copied twice.
+std::size_t PscScanner::read_some(std::size_t budget) {
+  if (incoming_.header_have < header_size) {
+    const auto room = std::span{incoming_.header}.subspan(incoming_.header_have);
+    const std::size_t count = link_.read(room.first(std::min(room.size(), budget)));
+    incoming_.header_have += count;
+    received_ += count;
+    return count;
+  }
+  const std::size_t length = incoming_.head.payload_length;
+  const auto room = std::span{body_}.first(length + payload_crc_size).subspan(incoming_.body_have);
+  const auto wanted = room.first(std::min(room.size(), budget));
+  const std::size_t count = link_.read(wanted);
+  if (incoming_.body_have < length) {
+    incoming_.crc = crc32c(wanted.first(std::min(count, length - incoming_.body_have)), incoming_.crc);
+  }
+  incoming_.body_have += count;
+  received_ += count;
+  return count;
+}
+
+bool PscScanner::take_header(Instant now) {
+  const auto head = decode_header(incoming_.header);
+  if (!head) {
+    broken(now, "header", head.error());
+    return false;
+  }
+  if (head->payload_length + payload_crc_size > body_.size()) {
+    broken(now, "header", Flaw::length);
+    return false;
+  }
+  incoming_.head = *head;
+  incoming_.payload_offset = received_;
+  return true;
+}
+
+void PscScanner::take_message(Instant now) {
+  const auto payload = std::span<const std::byte>{body_}.first(incoming_.head.payload_length);
+  if (!payload.empty()) {
+    std::uint32_t crc = 0;
+    std::memcpy(&crc, body_.data() + payload.size(), sizeof crc);
+    if (crc != incoming_.crc) return broken(now, "message", Flaw::payload_crc);
+  }
+  switch (incoming_.head.type) {
+    case Type::hello:
+      return on_hello(payload, now);
+    case Type::config:
+      return on_config(payload, now);
+    case Type::exposed:
+      return on_exposed(payload, now);
+    case Type::frame:
+      return on_frame(payload, now);
+    case Type::error:
+      return on_error(payload, now);
+    case Type::ping:    // that it came is all that it says
+    case Type::status:  // not asked for by this driver
+    case Type::trigger:
+    case Type::reset:
+      return;
+  }
+}
+
+void PscScanner::on_hello(std::span<const std::byte> payload, Instant now) {
+  if (phase_ != Phase::greeting) return;
+  const auto hello = decode_hello_reply(payload);
+  if (!hello) return broken(now, "HELLO", hello.error());
+  if (hello->status != Status::ok || hello->version != protocol_version) {
+    return lose(now, Message::format("the scanner does not speak version {} of PSC1", protocol_version));
+  }
+  const auto points = std::uint32_t{hello->max_stripes} * hello->max_points_per_stripe;
+  if (hello->max_stripes > settings_.max_stripes || points > settings_.max_points) {
+    return lose(
+        now,
+        Message::format("the scanner's frames ({} stripes, {} points) exceed the limits ({}, {}): raise them",
+                        hello->max_stripes, points, settings_.max_stripes, settings_.max_points));
+  }
+  const auto* name_end = std::ranges::find(hello->sensor, '\0');
+  info_.sensor =
+      std::string_view{hello->sensor.data(), static_cast<std::size_t>(name_end - hello->sensor.begin())};
+  info_.session_id = hello->session_id;
+  info_.max_stripes = hello->max_stripes;
+  info_.max_points = points;
+  info_.field_x_mm = hello->field_x_mm;
+  info_.field_y_mm = hello->field_y_mm;
+  info_.depth_mm = hello->depth_mm;
+  cue(Cue::greeted, now);
+}
+
+void PscScanner::on_config(std::span<const std::byte> payload, Instant now) {
+  if (phase_ != Phase::configuring) return;
+  const auto config = decode_config(payload);
+  if (!config) return broken(now, "CONFIG", config.error());
+  if (config->status != Status::ok) {
+    return lose(now, Message::format("the scanner refuses the configuration (status {})",
+                                     std::to_underlying(config->status)));
+  }
+  cue(Cue::configured, now);
+}
+
+void PscScanner::on_exposed(std::span<const std::byte> payload, Instant now) {
+  const auto exposed = decode_exposed(payload);
+  if (!exposed) return broken(now, "EXPOSED", exposed.error());
+  if (!shot_.outstanding || exposed->shot_id != shot_.id) return;
+  if (shot_.exposed && incoming_.head.request_id == shot_.exposed_request)
+    return;  // the same answer once more
+  if (exposed->session_id != info_.session_id)
+    return lose(now, "the scanner restarted: its session is a new one");
+  if (phase_ == Phase::exposing && exposed->repeated && shot_.attempts == 1) {
+    // A stored frame from before: an earlier run has used this id, the picture is of another place.
+    failure_ = "the scanner has exposed this shot id before: ids must not be used twice";
+    return cue(Cue::exposed_anew, now);
+  }
+  if (phase_ == Phase::computing && shot_.attempts > 1 && !exposed->repeated) {
+    failure_ = "the scanner had lost the frame and exposed again; the arm may have moved since";
+    return cue(Cue::exposed_anew, now);
+  }
+  cue(Cue::exposed, now);
+}
+
+void PscScanner::on_frame(std::span<const std::byte> payload, Instant now) {
+  const auto head = decode_frame_head(payload);
+  if (!head) return broken(now, "FRAME", head.error());
+  if (!shot_.outstanding || head->shot_id != shot_.id || head->session_id != info_.session_id) {
+    ++stale_frames_;
+    return;
+  }
+  if (const auto decoded = decode_frame(payload, frame_); !decoded)
+    return broken(now, "FRAME", decoded.error());
+  frame_.exposed_sensor_ns = incoming_.head.acquired_ns;
+  frame_.arrived = now;
+  frame_offset_ = incoming_.payload_offset;
+  frame_bytes_ = incoming_.head.payload_length;
+  cue(Cue::frame, now);
+}
+
+void PscScanner::on_error(std::span<const std::byte> payload, Instant now) {
+  const auto error = decode_error(payload);
+  if (!error) return broken(now, "ERROR", error.error());
+  const auto text =
+      Message::format("scanner: {} (status {})", error->text.view(), std::to_underlying(error->status));
+  const bool of_our_shot = shot_.outstanding && error->shot_id == shot_.id;
+  if (error->status == Status::busy && of_our_shot) {
+    ask_again_at_ = now + settings_.busy_pause;
+  } else if (error->status == Status::bad_state || phase_ == Phase::greeting ||
+             phase_ == Phase::configuring) {
+    lose(now, text);  // the sensor has forgotten its configuration: begin again
+  } else if (of_our_shot) {
+    failure_ = text;
+    cue(Cue::late, now);
+  }
+}
+
+// ---- time
+
+void PscScanner::transmit(Instant now) {
+  watch(now);
+  flush();
+}
+
+void PscScanner::watch(Instant now) {
+  switch (phase_) {
+    case Phase::idle:
+      return;
+    case Phase::waiting:
+      if (now >= wait_until_) cue(Cue::wait_over, now);
+      return;
+    case Phase::opening:
+      if (now >= deadline_) lose(now, "the scanner does not answer the connection request");
+      return;
+    case Phase::greeting:
+    case Phase::configuring:
+      if (now >= deadline_) lose(now, "the scanner does not answer the greeting");
+      return;
+    case Phase::ready:
+      break;
+    case Phase::exposing:
+    case Phase::computing:
+      if (now >= deadline_) {
+        failure_ = phase_ == Phase::exposing ? "the scanner did not expose in time"
+                                             : "the frame did not come in time";
+        cue(Cue::late, now);
+      } else if (ask_again_at_ && now >= *ask_again_at_) {
+        ask_again_at_.reset();
+        send(Trigger{.shot_id = shot_.id});
+      }
+      break;
+  }
+  if (now - heard_at_ > settings_.silent_pings * settings_.ping_period) {
+    lose(now, Message::format("the scanner has been silent for {} ms", (now - heard_at_) / 1ms));
+  } else if (now - pinged_at_ >= settings_.ping_period) {
+    pinged_at_ = now;
+    const auto room = std::span{outgoing_}.subspan(outgoing_size_);
+    outgoing_size_ += encode_empty(++request_id_, Type::ping, room);
+  }
+}
+
+// A request that finds no room is as good as lost on the way; its deadline takes care of it.
+template <typename M>
+void PscScanner::send(const M& message) {
+  outgoing_size_ += encode(++request_id_, message, std::span{outgoing_}.subspan(outgoing_size_));
+}
+
+void PscScanner::flush() {
+  if (outgoing_size_ == 0 || phase_ == Phase::waiting || phase_ == Phase::opening) return;
+  const std::size_t count = link_.write(std::span{outgoing_}.first(outgoing_size_));
+  std::copy(outgoing_.begin() + count, outgoing_.begin() + outgoing_size_, outgoing_.begin());
+  outgoing_size_ -= count;
+}
+
+void PscScanner::lose(Instant now, Message why) {
+  why_ = why;
+  cue(Cue::link_lost, now);
+}
+
+// A stream that once went wrong is never trusted again: no hunting for the next magic.
+void PscScanner::broken(Instant now, std::string_view what, Flaw flaw) {
+  ++broken_streams_;
+  lose(now, Message::format("{} from the scanner: {}", what, to_string(flaw)));
+}
+
+}  // namespace moldloft::hal

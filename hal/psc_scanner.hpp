@@ -1,0 +1,180 @@
+// The driver of a scanner that speaks PSC1 (PROTOCOLS.md), on any byte link.
+//
+//     link open -> HELLO -> CONFIG -> ready -> TRIGGER -> EXPOSED -> FRAME -> ready
+//
+// The way through it is the table in psc_scanner.cpp. A shot is repeated under its own id, so nothing is
+// exposed twice for one shot. One case the driver cannot mend: the sensor restarts (new session) between
+// EXPOSED and FRAME. The arm may have left by then, a second exposure would be of another place: such a shot
+// fails and the cell plans it again.
+//
+// Thread, blocking, allocation, failure: as Scanner says
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "hal/byte_link.hpp"
+#include "hal/event_queue.hpp"
+#include "hal/psc1.hpp"
+#include "hal/scanner.hpp"
+
+namespace moldloft::hal {
+
+class PscScanner final : public Scanner {
+ public:
+  struct Settings {
+    psc1::Encoding encoding = psc1::Encoding::int16;
+    bool intensity = true;
+
+    Duration connect_timeout = 2s;   // a connect that the network swallows would take minutes
+    Duration greeting_timeout = 1s;  // HELLO and CONFIG cost the sensor nothing
+    Duration exposure_timeout =
+        1s;                       // TRIGGER to EXPOSED: exposure, and a sensor that finishes its last frame
+    Duration frame_timeout = 2s;  // EXPOSED to the last byte: 0.1 s of computing, 0.3 s at 10 Mb/s, margin
+    Duration busy_pause = 50ms;   // a sensor that said BUSY is asked again after this long
+    Duration ping_period = 1s;
+    int silent_pings = 3;             // periods without a byte after which the scanner counts as lost
+    Duration first_back_off = 100ms;  // doubles with each failure
+    Duration last_back_off = 2s;      // a scanner that has booted is found within this time
+    int retries = 2;                  // of one shot, after the first attempt
+
+    std::size_t bytes_a_tick = 64u << 10;  // half a tick of a 1 Gb/s line; bounds what one receive() costs
+    std::uint32_t max_stripes = 200;       // of one frame; larger ones are refused at CONFIG
+    std::uint32_t max_points = 100'000;
+  };
+
+  PscScanner(ByteLink&, const Settings&);
+
+  void start(Instant now) override;
+  void receive(Instant now) override;
+  void transmit(Instant now) override;
+  bool trigger(std::uint32_t shot_id, Instant now) override;
+  void forget_shot() override;
+  std::optional<ScannerEvent> next_event() override { return events_.pop(); }
+  ScannerState state() const override;
+  const ScannerInfo& info() const override { return info_; }
+  const Frame& frame() const override { return frame_; }
+  std::uint64_t frame_offset() const override { return frame_offset_; }
+  std::uint32_t frame_bytes() const override { return frame_bytes_; }
+  std::string_view why() const override { return why_; }
+
+  int attempts() const { return shot_.attempts; }  // TRIGGERs sent for the last shot
+  std::uint64_t stale_frames() const {
+    return stale_frames_;
+  }  // whole and valid, but of another shot or session
+  std::uint64_t broken_streams() const {
+    return broken_streams_;
+  }                                // connections dropped for bytes that were wrong
+  std::size_t plan_bytes() const;  // memory taken at construction
+
+ private:
+  enum class Phase { idle, waiting, opening, greeting, configuring, ready, exposing, computing };
+  enum class Cue {
+    start,
+    wait_over,
+    link_open,
+    link_lost,
+    greeted,
+    configured,
+    triggered,
+    exposed,
+    exposed_anew,
+    frame,
+    late,
+    forgotten
+  };
+  struct Transition;
+  static const Transition transitions[];
+
+  struct Shot {
+    std::uint32_t id = 0;
+    bool outstanding = false;
+    bool exposed = false;  // the cell has been told; the arm may have moved
+    int attempts = 0;
+    std::uint32_t session_id = 0;       // in which it was exposed
+    std::uint32_t exposed_request = 0;  // whose answer said so
+  };
+
+  // Where the bytes of the message on its way go.
+  struct Incoming {
+    std::array<std::byte, psc1::header_size> header{};
+    std::size_t header_have = 0;
+    psc1::Header head{};
+    std::size_t body_have = 0;  // payload and its CRC
+    std::uint32_t crc = 0;      // of the payload bytes so far
+    std::uint64_t payload_offset = 0;
+  };
+
+  void cue(Cue, Instant now);
+
+  // guards
+  bool always() const { return true; }
+  bool has_retries() const { return shot_.attempts <= settings_.retries; }
+  bool shot_waits() const { return shot_.outstanding && !shot_.exposed && has_retries(); }
+  bool frame_waits() const { return shot_.outstanding && shot_.exposed && has_retries() && same_session(); }
+  bool shot_is_void() const { return shot_.outstanding; }
+  bool same_session() const { return shot_.session_id == info_.session_id; }
+
+  // actions
+  void nothing(Instant) {}
+  void open_link(Instant now);
+  void back_off(Instant now);
+  void report_loss(Instant now);
+  void greet(Instant now);
+  void configure(Instant now);
+  void announce(Instant now);
+  void announce_and_trigger(Instant now);
+  void announce_and_fail(Instant now);
+  void send_trigger(Instant now);
+  void report_exposed(Instant now);
+  void report_frame(Instant now);
+  void report_both(Instant now);  // EXPOSED and FRAME in one
+  void fail_shot(Instant now);
+  void drop_shot(Instant now);
+
+  // what arrives
+  std::size_t read_some(std::size_t budget);
+  bool take_header(Instant now);
+  void take_message(Instant now);
+  void on_hello(std::span<const std::byte> payload, Instant now);
+  void on_config(std::span<const std::byte> payload, Instant now);
+  void on_exposed(std::span<const std::byte> payload, Instant now);
+  void on_frame(std::span<const std::byte> payload, Instant now);
+  void on_error(std::span<const std::byte> payload, Instant now);
+
+  void watch(Instant now);
+  void flush();
+  void lose(Instant now, Message why);
+  void broken(Instant now, std::string_view what, psc1::Flaw);
+  template <typename M>
+  void send(const M& message);
+
+  ByteLink& link_;
+  const Settings settings_;
+  std::vector<std::byte> body_;
+  Frame frame_;
+  ScannerInfo info_;
+  Incoming incoming_;
+  std::array<std::byte, 256> outgoing_{};
+  std::size_t outgoing_size_ = 0;
+  EventQueue<ScannerEvent, 16> events_;
+
+  Phase phase_ = Phase::idle;
+  Shot shot_;
+  bool announced_ = false;               // ready was reported and not taken back by lost
+  Instant wait_until_{0};                // end of the back-off
+  Instant deadline_{0};                  // of the answer that the phase waits for
+  std::optional<Instant> ask_again_at_;  // after BUSY
+  Instant heard_at_{0}, pinged_at_{0};
+  Duration back_off_{0};
+  std::uint32_t request_id_ = 0;
+  std::uint64_t received_ = 0;  // all bytes ever read from the link
+  std::uint64_t frame_offset_ = 0;
+  std::uint32_t frame_bytes_ = 0;
+  std::uint64_t stale_frames_ = 0, broken_streams_ = 0;
+  Message why_ = "not started yet";
+  Message failure_;  // why the last attempt of the shot failed
+};
+
+}  // namespace moldloft::hal
