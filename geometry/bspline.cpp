@@ -26,8 +26,8 @@ int find_span(std::span<const double> knots, double t) {
 }
 
 BasisValues cubic_basis(std::span<const double> knots, int k, double t) {
-  // The recurrence raises the degree once a row: every entry is a sum of nonnegative terms inside the span, so nothing
-  // cancels. The rows of degree 1 and 2 give the derivatives by differences (thesis eq. 2.45).
+  // The recurrence raises the degree once a row: every entry is a sum of nonnegative terms inside the span,
+  // so nothing cancels. The rows of degree 1 and 2 give the derivatives by differences (thesis eq. 2.45).
   const double left1 = t - knots[k], left2 = t - knots[k - 1], left3 = t - knots[k - 2];
   const double right1 = knots[k + 1] - t, right2 = knots[k + 2] - t, right3 = knots[k + 3] - t;
 
@@ -49,6 +49,28 @@ BasisValues cubic_basis(std::span<const double> knots, int k, double t) {
   const double d0 = -2 * q0 * inv30, d1 = 2 * (q0 - q1) * inv31, d2 = 2 * q1 * inv32;
   basis.second = {-3 * d0, 3 * (d0 - d1), 3 * (d1 - d2), 3 * d2};
   return basis;
+}
+
+double greville(std::span<const double> knots, int i) {
+  return (knots[i + 1] + knots[i + 2] + knots[i + 3]) / 3;
+}
+
+double refined_coefficient(std::span<const double> coarse, std::span<const double> coefficients,
+                           std::span<const double> fine, int i) {
+  // De Boor's triangle with a different argument at every level evaluates the blossom of the piece that lies
+  // there.
+  const int k = find_span(coarse, 0.5 * (fine[i + 1] + fine[i + 3]));
+  std::array<double, 4> d;
+  for (int j = 0; j <= cubic; ++j) d[j] = coefficients[k - cubic + j];
+  for (int level = 1; level <= cubic; ++level) {
+    const double t = fine[i + level];
+    for (int j = cubic; j >= level; --j) {
+      const double low = coarse[k - cubic + j], high = coarse[k + 1 + j - level];
+      const double share = (t - low) / (high - low);
+      d[j] = (1 - share) * d[j - 1] + share * d[j];
+    }
+  }
+  return d[cubic];
 }
 
 CurvePoint2 PlanCurve::at(double t) const {

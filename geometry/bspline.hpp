@@ -6,7 +6,7 @@
 // Allocation   only where a vector is built or resized
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <span>
 #include <vector>
@@ -26,6 +26,15 @@ struct BasisValues {
   std::array<double, 4> value, first, second;
 };
 BasisValues cubic_basis(std::span<const double> knots, int k, double t);
+
+// The Greville abscissa of control point i: where a control point sits on a straight line at unit speed.
+double greville(std::span<const double> knots, int i);
+
+// Coefficient i, over the knots `fine`, of the spline that has `coefficients` over the knots `coarse`; `fine`
+// must contain every knot of `coarse`. Exact: the spline's blossom at three consecutive fine knots (Ramshaw
+// 1987).
+double refined_coefficient(std::span<const double> coarse, std::span<const double> coefficients,
+                           std::span<const double> fine, int i);
 
 struct CurvePoint2 {
   Eigen::Vector2d value, first, second;

@@ -1,17 +1,19 @@
 // Finds the plate in one frame: on every stripe the runs of points that lie on it, and how each run ends.
 //
-// Along a stripe a run is cut where the surface jumps or the data stop (thesis section 5.3.1: the plate's thickness
-// makes an abrupt change of tangent). Runs of neighbouring stripes that continue each other in height form a region;
-// the plate is the region that the hint lies on. A drop-out inside the plate is bridged, an outlier skipped.
-// At a jump the plate is the nearer (higher) side: a jump upwards is something that lies on the plate or hides it, not
-// the plate's edge.
+// Along a stripe a run is cut where the surface jumps or the data stop (thesis section 5.3.1: the plate's
+// thickness makes an abrupt change of tangent). Runs of neighbouring stripes that continue each other in
+// height form a region; the plate is the region that the hint lies on. A drop-out inside the plate is
+// bridged, an outlier skipped. At a jump the plate is the nearer (higher) side: a jump upwards is something
+// that lies on the plate or hides it, not the plate's edge.
 //
-// Frame        scanner coordinates (mm): stripes run along +y, follow one another along +x, z towards the scanner
-// Accuracy     an edge lies half a point spacing beyond the run's last good point, so without bias; standard deviation
+// Frame        scanner coordinates (mm): stripes run along +y, follow one another along +x, z towards the
+// scanner Accuracy     an edge lies half a point spacing beyond the run's last good point, so without bias;
+// standard deviation
 //              0.29 spacings along the stripe
-// Cost         O(points); about 1 ns a point and 1 us a stripe
+// Cost         O(points); 50,000 points in 100 stripes take about 0.5 ms
 // Allocation   in the constructor only
-// Failure      Error::not_on_plate when the hint hits nothing, Error::capacity when the frame is larger than planned
+// Failure      Error::not_on_plate when the hint hits nothing, Error::capacity when the frame is larger than
+// planned
 #pragma once
 
 #include <Eigen/Core>
@@ -38,36 +40,56 @@ enum class RunEnd : std::uint8_t {
 constexpr bool is_edge(RunEnd end) { return end == RunEnd::step_down || end == RunEnd::free_end; }
 
 struct PlateRun {
-  std::uint16_t stripe = 0;            // position in the span of stripes given
-  std::uint32_t first = 0, last = 0;   // its first and last good point on that stripe, both on the plate
+  std::uint16_t stripe = 0;           // position in the span of stripes given
+  std::uint32_t first = 0, last = 0;  // its first and last good point on that stripe, both on the plate
   RunEnd at_first = RunEnd::field_limit, at_last = RunEnd::field_limit;
-  Eigen::Vector3d edge_first, edge_last;  // where it leaves the plate, where the end is an edge (scanner coordinates)
+  // Where it leaves the plate, where the end is an edge (scanner coordinates).
+  Eigen::Vector3d edge_first = Eigen::Vector3d::Zero(), edge_last = Eigen::Vector3d::Zero();
 };
 
 struct PlateRunSettings {
-  double noise_mm = 0.051;       // standard deviation of a point's height
-  double min_step_mm = 1.5;      // a drop beyond this is an edge; well below the plate's thickness
-  double bridge_mm = 4.0;        // a gap up to this with the same surface on both sides is a drop-out
-  double min_run_mm = 3.0;       // shorter runs are outliers
-  double field_half_y_mm = 51.0; // a run that ends within field_margin_mm of it ends at the field's limit
+  double noise_mm = 0.051;        // standard deviation of a point's height
+  double min_step_mm = 1.5;       // a drop beyond this is an edge; well below the plate's thickness
+  double bridge_mm = 4.0;         // a gap up to this with the same surface on both sides is a drop-out
+  double min_run_mm = 3.0;        // shorter runs are outliers
+  double field_half_y_mm = 51.0;  // a run that ends within field_margin_mm of it ends at the field's limit
   double field_margin_mm = 1.0;
+  double hint_reach_mm = 15.0;  // a hint farther than this from every run hits nothing
 };
 
 class PlateRunFinder {
  public:
   PlateRunFinder(std::size_t max_stripes, std::size_t max_points);
+  ~PlateRunFinder();
+  PlateRunFinder(PlateRunFinder&&) noexcept;
 
-  // The plate's runs, stripe by stripe; valid until the next call. `hint` is a point on or near the plate (scanner
-  // coordinates); the region with a run nearest to it is the plate.
-  std::expected<std::span<const PlateRun>, Error> find(std::span<const StripeView> stripes, const Eigen::Vector3d& hint,
+  // The plate's runs, stripe by stripe; valid until the next call. `hint` is a point on or near the plate
+  // (scanner coordinates); the region with a run nearest to it is the plate.
+  std::expected<std::span<const PlateRun>, Error> find(std::span<const StripeView> stripes,
+                                                       const Eigen::Vector3d& hint,
                                                        const PlateRunSettings& settings);
 
   std::size_t bytes() const;
 
  private:
-  struct Run;
+  struct Run;    // a stretch of good points on one stripe, linked into its region
+  struct Piece;  // a stretch of one stripe before stretches are joined
+
+  void cut_stripe(const StripeView&, const PlateRunSettings&);
+  void join_pieces(const StripeView&, const PlateRunSettings&);
+  void drop_short_pieces(const StripeView&, std::size_t min_points, double min_length_mm);
+  void trim_ends(const StripeView&, const PlateRunSettings&);
+  bool keep_runs(std::uint16_t stripe, const StripeView&, const PlateRunSettings&);
+  void link_stripes(std::span<const StripeView>, const PlateRunSettings&);
+  std::size_t nearest_run(std::span<const StripeView>, const Eigen::Vector3d& hint, double reach_mm) const;
+  std::uint32_t region_of(std::uint32_t run) const;
+
+  std::vector<std::uint32_t> good_;  // indices of good points, stripe after stripe; runs are stretches of it
+  std::vector<Piece> pieces_;        // of the stripe at hand
+  std::vector<Run> runs_;            // of the whole frame, in order of stripe and y
+  std::vector<std::uint32_t> first_run_;  // of every stripe, and one past the end
   std::vector<PlateRun> found_;
-  // further arrays of fixed capacity
+  std::size_t max_stripes_, max_points_;
 };
 
 }  // namespace moldloft::geometry

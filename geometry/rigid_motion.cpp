@@ -7,7 +7,8 @@ namespace moldloft::geometry {
 
 namespace {
 
-// Below this pitch (rad, or this far from pi) yaw and roll turn about the same axis as far as a pose can tell.
+// Below this pitch (rad, or this far from pi) yaw and roll turn about the same axis as far as a pose can
+// tell.
 constexpr double gimbal_pitch = 1e-9;
 
 }  // namespace
@@ -20,11 +21,12 @@ Eigen::Matrix3d rotation_from_zyz(const ZyzAngles& angles) {
 }
 
 ZyzAngles zyz_from_rotation(const Eigen::Matrix3d& r) {
-  // The third column is the tool axis (cos yaw sin pitch, sin yaw sin pitch, cos pitch); atan2 of its length keeps
-  // full accuracy where acos of its height would lose half the digits.
+  // The third column is the tool axis (cos yaw sin pitch, sin yaw sin pitch, cos pitch); atan2 of its length
+  // keeps full accuracy where acos of its height would lose half the digits.
   const double pitch = std::atan2(std::hypot(r(0, 2), r(1, 2)), r(2, 2));
   if (pitch < gimbal_pitch) return {0.0, pitch, wrapped_angle(std::atan2(r(1, 0), r(0, 0)))};
-  if (std::numbers::pi - pitch < gimbal_pitch) return {0.0, pitch, wrapped_angle(std::atan2(r(1, 0), -r(0, 0)))};
+  if (std::numbers::pi - pitch < gimbal_pitch)
+    return {0.0, pitch, wrapped_angle(std::atan2(r(1, 0), -r(0, 0)))};
   return {wrapped_angle(std::atan2(r(1, 2), r(0, 2))), pitch, wrapped_angle(std::atan2(r(2, 1), -r(2, 0)))};
 }
 

@@ -1,15 +1,16 @@
-// The streaming surface fit: points are folded into Bernstein moments cell by cell and forgotten; nets of 2^k by 2^l
-// spans come out of the same pass; generalized cross-validation picks one.
+// The streaming surface fit: points are folded into Bernstein moments cell by cell and forgotten; nets of 2^k
+// by 2^l spans come out of the same pass; generalized cross-validation picks one.
 //
-// Model        z(u, v) = sum N_i(u) M_j(v) z_ij + d_s, with d_s the unknown height error of shot s (robot repeatability),
-//              a zero-mean random effect with standard deviation shot_sigma_mm: overlapping shots and neighbours
-//              estimate it together with the surface. (u, v) are plan-view parameters (plan_map.hpp).
-// Moments      per cell 7 x 7 of B6 B6 and 4 x 4 of z B3 B3 (field notes, "Bernstein moments"), per shot 4 x 4 of B3 B3.
-// Fairing      a thin-plate term, tiny relative to the data, so that cells without points stay defined
-// Frame        world, mm
-// Work         add() costs O(points) and is called with bounded chunks; step() does one bounded piece of the solution
-// Memory       fixed by the settings, never by the number of points; all of it allocated in the constructor
-// Failure      Error::capacity, singular, not_finite, too_few_points
+// Model        z(u, v) = sum N_i(u) M_j(v) z_ij + d_s, with d_s the unknown height error of shot s (robot
+// repeatability),
+//              a zero-mean random effect with standard deviation shot_sigma_mm: overlapping shots and
+//              neighbours estimate it together with the surface. (u, v) are plan-view parameters
+//              (plan_map.hpp).
+// Moments      per cell 7 x 7 of B6 B6 and 4 x 4 of z B3 B3 (field notes, "Bernstein moments"), per shot 4 x
+// 4 of B3 B3. Fairing      a thin-plate term, tiny relative to the data, so that cells without points stay
+// defined Frame        world, mm Work         add() costs O(points) and is called with bounded chunks; step()
+// does one bounded piece of the solution Memory       fixed by the settings, never by the number of points;
+// all of it allocated in the constructor Failure      Error::capacity, singular, not_finite, too_few_points
 #pragma once
 
 #include <cstdint>
@@ -26,8 +27,8 @@ namespace moldloft::geometry {
 struct SurfaceFitSettings {
   int max_spans_u = 32, max_spans_v = 32;  // finest net, powers of two, at least 4
   int max_shots = 64;
-  double shot_sigma_mm = 0.013;            // 0: shots are taken as exact
-  double fairing = 1e-9;                   // relative to the data's weight
+  double shot_sigma_mm = 0.013;  // 0: shots are taken as exact
+  double fairing = 1e-9;         // relative to the data's weight
 };
 
 struct SurfaceFitReport {
@@ -46,8 +47,8 @@ class SurfaceFit {
   ~SurfaceFit();
 
   void begin(const PlanMap& map);  // forgets everything; the map must stay alive
-  // Folds points of one shot in. `shot` counts from 0; all points of one shot must be added before another shot begins.
-  // Points off the plate are counted and left out. Wholly bounded by the size of the chunk.
+  // Folds points of one shot in. `shot` counts from 0; all points of one shot must be added before another
+  // shot begins. Points off the plate are counted and left out. Wholly bounded by the size of the chunk.
   std::expected<void, Error> add(std::span<const Eigen::Vector3d> world_points, double weight, int shot);
 
   void start_solving();

@@ -1,0 +1,37 @@
+#include "geometry/heap_watch.hpp"
+
+#include <atomic>
+#include <cstdlib>
+
+namespace {
+std::atomic<std::size_t> count{0};
+}
+
+namespace moldloft::test {
+std::size_t allocations() noexcept { return count.load(std::memory_order_relaxed); }
+}  // namespace moldloft::test
+
+// glibc's own entry points stand behind these names: operator new and Eigen's allocator both end here.
+extern "C" {
+void* __libc_malloc(std::size_t);
+void* __libc_calloc(std::size_t, std::size_t);
+void* __libc_realloc(void*, std::size_t);
+void* __libc_memalign(std::size_t, std::size_t);
+
+void* malloc(std::size_t size) {
+  count.fetch_add(1, std::memory_order_relaxed);
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t n, std::size_t size) {
+  count.fetch_add(1, std::memory_order_relaxed);
+  return __libc_calloc(n, size);
+}
+void* realloc(void* old, std::size_t size) {
+  count.fetch_add(1, std::memory_order_relaxed);
+  return __libc_realloc(old, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+  count.fetch_add(1, std::memory_order_relaxed);
+  return __libc_memalign(alignment, size);
+}
+}

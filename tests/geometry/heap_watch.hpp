@@ -1,0 +1,10 @@
+// Counts every allocation of the test program, so that a test can say that a call made none.
+#pragma once
+
+#include <cstddef>
+
+namespace moldloft::test {
+
+std::size_t allocations() noexcept;  // since the program started
+
+}  // namespace moldloft::test
