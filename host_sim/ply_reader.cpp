@@ -188,7 +188,7 @@ std::expected<TriangleMesh, SimError> read_ply(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return refused("cannot be opened");
   const std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  if (file.bad() || (bytes.empty() && !file.eof())) return refused("cannot be read");
+  if (file.bad()) return refused("cannot be read");
   const auto header = read_header(path, bytes);
   if (!header) return Failure(header.error());
 

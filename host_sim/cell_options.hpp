@@ -1,0 +1,13 @@
+// The options by which every command of moldloft-sim describes its cell. They bind to a CellDescription that
+// must outlive the parsing.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "host_sim/cell_description.hpp"
+
+namespace moldloft::host_sim {
+
+void add_cell_options(CLI::App& command, CellDescription& cell);
+
+}  // namespace moldloft::host_sim

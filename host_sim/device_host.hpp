@@ -1,0 +1,21 @@
+// The simulated devices in real time: the scanner on a loopback TCP port, the robot on a pseudo-terminal, for
+// a controller that cannot tell them from real ones.
+#pragma once
+
+#include <string>
+
+#include "host_sim/cell_description.hpp"
+
+namespace moldloft::host_sim {
+
+struct DeviceOptions {
+  CellDescription cell;
+  std::uint16_t scanner_port = hal::psc1::default_port;  // 0: any that is free
+  std::string robot_pty = "/tmp/moldloft-robot";
+};
+
+// Prints one line when both devices can be reached, serves until SIGINT or SIGTERM, and lets clients come and
+// go. Returns the program's exit code; a failure has been printed in one line.
+int run_devices(const DeviceOptions&);
+
+}  // namespace moldloft::host_sim

@@ -1,0 +1,123 @@
+#include <doctest/doctest.h>
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <filesystem>
+#include <string>
+#include <thread>
+
+#include "hal/psc1.hpp"
+#include "hal/tcp_link.hpp"
+#include "host_sim/cell_description.hpp"
+#include "host_sim/pty_link.hpp"
+#include "host_sim/tcp_server_link.hpp"
+
+using namespace moldloft;
+using namespace moldloft::host_sim;
+using namespace std::chrono_literals;
+
+namespace {
+
+std::string name_of_this_test() { return "/tmp/moldloft_test_robot_" + std::to_string(::getpid()); }
+
+// Serves PNG on the terminal from a thread of its own until told to end.
+class Robot {
+ public:
+  explicit Robot(PtyLink& link)
+      : server_(link, ArmDrive(make_scara({}), {}, 1), {}), thread_([this] { serve(); }) {}
+  ~Robot() {
+    end_ = true;
+    thread_.join();
+  }
+
+ private:
+  void serve() {
+    hal::SteadyClock clock;
+    while (!end_) {
+      server_.step(clock.now());
+      std::this_thread::sleep_for(1ms);
+    }
+  }
+  RobotServer server_;
+  std::atomic<bool> end_ = false;
+  std::thread thread_;
+};
+
+int probe(const std::string& device, bool with_shim) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (with_shim) ::setenv("LD_PRELOAD", PTY_MODEM, 1);
+    const int null = ::open("/dev/null", O_WRONLY);
+    ::dup2(null, 1);
+    ::dup2(null, 2);
+    ::execl(SERIAL_PROBE, SERIAL_PROBE, device.c_str(), nullptr);
+    ::_exit(127);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+}  // namespace
+
+TEST_CASE("the controller's own serial driver opens the robot's pseudo-terminal, again and again") {
+  const auto link = PtyLink::create(name_of_this_test());
+  REQUIRE_MESSAGE(link.has_value(), link.error().what);
+  Robot robot(**link);
+  CHECK(probe(name_of_this_test(), true) == 0);
+  std::this_thread::sleep_for(20ms);
+  CHECK(probe(name_of_this_test(), true) == 0);  // after the first has hung up
+}
+
+TEST_CASE("without the shim libserialport refuses it: the shim is what makes it work") {
+  const auto link = PtyLink::create(name_of_this_test());
+  REQUIRE(link.has_value());
+  Robot robot(**link);
+  CHECK(probe(name_of_this_test(), false) == 3);
+}
+
+TEST_CASE("the terminal's name is taken away with it, and a file in its place is left alone") {
+  const std::string name = name_of_this_test();
+  {
+    const auto link = PtyLink::create(name);
+    REQUIRE(link.has_value());
+    CHECK(std::filesystem::is_symlink(name));
+  }
+  CHECK_FALSE(std::filesystem::exists(std::filesystem::symlink_status(name)));
+  ::close(::open(name.c_str(), O_CREAT | O_WRONLY, 0600));
+  CHECK_FALSE(PtyLink::create(name).has_value());
+  CHECK(std::filesystem::is_regular_file(name));
+  std::filesystem::remove(name);
+}
+
+TEST_CASE("a client on the scanner's port comes, goes and comes again") {
+  const auto server = TcpServerLink::listen_on(0);
+  REQUIRE(server.has_value());
+  auto& device = **server;
+  CHECK(TcpServerLink::listen_on(device.port()).error().what.find("in use") != std::string::npos);
+  device.open();
+  CHECK(device.state() == hal::LinkState::opening);
+  const auto until = [](auto&& condition) {
+    for (int k = 0; k < 2000; ++k) {
+      if (condition()) return true;
+      std::this_thread::sleep_for(1ms);
+    }
+    return false;
+  };
+  for (int round = 0; round < 2; ++round) {
+    const auto client = hal::make_tcp_link("127.0.0.1", device.port());
+    client->open();
+    REQUIRE(until(
+        [&] { return client->state() == hal::LinkState::open && device.state() == hal::LinkState::open; }));
+    const std::array<std::byte, 3> sent = {std::byte{1}, std::byte{2}, std::byte{3}};
+    CHECK(client->write(sent) == 3);
+    std::array<std::byte, 8> got{};
+    CHECK(until([&] { return device.read(got) == 3; }));
+    client->close();
+    CHECK(until([&] { return device.state() == hal::LinkState::lost; }));
+    device.open();
+  }
+}
