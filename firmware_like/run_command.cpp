@@ -127,7 +127,7 @@ int run_cell(const RunOptions& options) {
     while (controller->tick()) {
     }
   }
-  const RunLabel label{.plate = config->name};
+  const RunLabel label{.plate = config->name, .seed = {}};
   const Json summary = summary_of(*controller, label);
   if (const auto written = write_results(*controller, *folder, label, summary); !written) return complain(written.error().what);
   fmt::print("{}", result_table(summary, out.string()));
@@ -151,7 +151,7 @@ int fit_run(const FitOptions& options) {
   controller->start();
   while (controller->tick()) {
   }
-  const RunLabel label{.plate = config->name};
+  const RunLabel label{.plate = config->name, .seed = {}};
   const Json summary = summary_of(*controller, label);
   std::error_code failed;
   std::filesystem::create_directories(options.out, failed);

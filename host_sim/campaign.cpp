@@ -37,13 +37,25 @@ struct Row {
   bool good = false;
 };
 
+bool parse_seeds(const std::string& text, std::uint64_t& first, std::uint64_t& last) {
+  const auto dots = text.find("..");
+  const std::string a = text.substr(0, dots), b = dots == std::string::npos ? a : text.substr(dots + 2);
+  const auto parse = [](const std::string& s, std::uint64_t& value) {
+    const auto end = s.data() + s.size();
+    return !s.empty() && std::from_chars(s.data(), end, value).ptr == end;
+  };
+  return parse(a, first) && parse(b, last) && first <= last;
+}
+
 std::vector<Job> jobs_for(const CampaignOptions& options) {
+  std::uint64_t first = 1, last = 0;
+  if (!parse_seeds(options.seeds, first, last)) return {};
   std::vector<Job> jobs;
   for (const auto& plate : shape_names()) {
     if (options.plates != "all" && options.plates != plate) continue;
     for (const auto& outline : outline_names()) {
       if (options.outlines != "all" && options.outlines != outline) continue;
-      for (auto seed = options.first_seed; seed <= options.last_seed; ++seed) {
+      for (auto seed = first; seed <= last; ++seed) {
         jobs.push_back({std::string{plate}, *outline_named(outline), std::string{outline}, seed});
       }
     }
@@ -106,20 +118,10 @@ void print_summary(const std::vector<Row>& rows) {
 
 }  // namespace
 
-bool parse_seeds(const std::string& text, std::uint64_t& first, std::uint64_t& last) {
-  const auto dots = text.find("..");
-  const std::string a = text.substr(0, dots), b = dots == std::string::npos ? a : text.substr(dots + 2);
-  const auto parse = [](const std::string& s, std::uint64_t& value) {
-    const auto end = s.data() + s.size();
-    return !s.empty() && std::from_chars(s.data(), end, value).ptr == end;
-  };
-  return parse(a, first) && parse(b, last) && first <= last;
-}
-
 int run_campaign(const CampaignOptions& options) {
   const auto jobs = jobs_for(options);
   if (jobs.empty()) {
-    fmt::print(stderr, "moldloft-sim campaign: no such plate or outline; plates: {}; outlines: {}; or all\n",
+    fmt::print(stderr, "moldloft-sim campaign: nothing to run; --plates all or one of {}; --outlines all or one of {}; --seeds A..B\n",
                fmt::join(shape_names(), ", "), fmt::join(outline_names(), ", "));
     return 1;
   }

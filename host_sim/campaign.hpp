@@ -13,13 +13,10 @@ struct CampaignOptions {
   CellDescription cell;          // what all runs have in common
   std::string plates = "all";    // or one shape's name
   std::string outlines = "all";  // or one outline's name
-  std::uint64_t first_seed = 1, last_seed = 3;
+  std::string seeds = "1..3";    // A..B or A
   bool json = false;
   std::string out;  // keep the run folders here; empty: they are removed
 };
-
-// "A..B" or "A".
-bool parse_seeds(const std::string& text, std::uint64_t& first, std::uint64_t& last);
 
 int run_campaign(const CampaignOptions&);  // the program's exit code: 0 when every run completed within the limits
 

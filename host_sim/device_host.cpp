@@ -5,6 +5,8 @@
 #include <csignal>
 #include <cstdio>
 
+#include "firmware_like/results.hpp"
+#include "host_sim/cell_config.hpp"
 #include "host_sim/pty_link.hpp"
 #include "host_sim/tcp_server_link.hpp"
 #include "host_sim/world.hpp"
@@ -40,14 +42,16 @@ int run_devices(const DeviceOptions& options) {
   const auto robot = PtyLink::create(options.robot_pty);
   if (!robot) return failed(robot.error());
 
+  if (!options.cell_toml.empty()) {
+    const CellAddresses here{.scanner_port = (*scanner)->port(), .robot_device = (*robot)->path()};
+    const auto written = firmware_like::write_file(options.cell_toml, cell_toml(options.cell, *plate, here));
+    if (!written) return failed({written.error().what});
+  }
+
   catch_signals();
   SimulatedWorld world(options.cell, *plate, **scanner, **robot);
-  const auto start = start_pose(options.cell);
-  fmt::print(
-      "ready: scanner 127.0.0.1:{} robot {} plate {} seed {} start {:.3f} {:.3f} {:.3f} {:.3f} {:.3f} "
-      "{:.3f}\n",
-      (*scanner)->port(), (*robot)->path(), options.cell.plate, options.cell.seed, start.x_mm, start.y_mm,
-      start.z_mm, start.yaw / hal::degree, start.pitch / hal::degree, start.roll / hal::degree);
+  fmt::print("ready: scanner 127.0.0.1:{} robot {} plate {} seed {}\n", (*scanner)->port(), (*robot)->path(),
+             plate->plate->name(), options.cell.seed);
   std::fflush(stdout);
 
   hal::SteadyClock clock;

@@ -12,6 +12,7 @@ struct DeviceOptions {
   CellDescription cell;
   std::uint16_t scanner_port = hal::psc1::default_port;  // 0: any that is free
   std::string robot_pty = "/tmp/moldloft-robot";
+  std::string cell_toml;  // where to write a configuration that fits these devices; empty: nowhere
 };
 
 // Prints one line when both devices can be reached, serves until SIGINT or SIGTERM, and lets clients come and

@@ -1,12 +1,17 @@
 // moldloft-sim: the simulated cell as a program.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "firmware_like/display.hpp"
+#include "firmware_like/run_command.hpp"
+#include "host_sim/campaign.hpp"
 #include "host_sim/cell_options.hpp"
 #include "host_sim/device_host.hpp"
 #include "host_sim/judge.hpp"
+#include "host_sim/simulated_run.hpp"
 
 using namespace moldloft::host_sim;
 
@@ -27,6 +32,44 @@ int judge_command(const std::string& folder, const CellDescription& cell) {
   return 0;
 }
 
+int cell_command(SimulatedRunOptions& options) {
+  if (options.out.empty()) options.out = moldloft::firmware_like::default_run_path();
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  if (terminal) {
+    options.on_progress = [](const moldloft::tasks::CellProgress& p) {
+      fmt::print(stderr, "\r\x1b[K{}", moldloft::firmware_like::progress_line(p));
+      std::fflush(stderr);
+    };
+  }
+  const auto run = simulate(options);
+  if (terminal) fmt::print(stderr, "\n");
+  if (!run) {
+    fmt::print(stderr, "moldloft-sim cell: {}\n", run.error().what);
+    return 1;
+  }
+  fmt::print("{}", moldloft::firmware_like::result_table(run->summary, options.out.string()));
+  if (run->exit_code != 0) fmt::print(stderr, "moldloft-sim cell: {}\n", run->summary["message"].get<std::string>());
+  return run->exit_code;
+}
+
+void add_cell_command(CLI::App& app, SimulatedRunOptions& options) {
+  auto* command = app.add_subcommand("cell", "the whole cell in one thread: controller, cables and devices");
+  add_cell_options(*command, options.cell);
+  command->add_option("--out", options.out, "the run's folder; default: a new one under out/");
+  command->add_option_function<std::string>("--clock", [&](const std::string& c) { options.real_time = c == "real"; },
+                                            "virtual: as fast as it goes; real: paced by the wall clock")
+      ->check(CLI::IsMember({"virtual", "real"}));
+}
+
+void add_campaign_command(CLI::App& app, CampaignOptions& options) {
+  auto* command = app.add_subcommand("campaign", "many simulated runs: shapes x outlines x seeds");
+  command->add_option("--plates", options.plates, "all, or one shape")->capture_default_str();
+  command->add_option("--outlines", options.outlines, "all, or one outline")->capture_default_str();
+  command->add_option("--seeds", options.seeds, "A..B or A")->capture_default_str();
+  command->add_option("--out", options.out, "keep the run folders here");
+  command->add_flag("--json", options.json, "an array of objects instead of the table");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -42,13 +85,26 @@ int main(int argc, char** argv) {
   devices_command->add_option("--robot-pty", devices.robot_pty, "name for the robot's terminal")
       ->capture_default_str();
 
+  devices_command->add_option("--cell", devices.cell_toml, "write a configuration that fits these devices to this file");
+
+  SimulatedRunOptions run;
+  add_cell_command(app, run);
+  CampaignOptions campaign;
+  add_campaign_command(app, campaign);
+
   CellDescription judged;
   std::string folder;
   auto* judged_command = app.add_subcommand("judge", "compare a run's results with the truth");
   judged_command->add_option("folder", folder, "the run folder")->required();
   add_cell_options(*judged_command, judged);
 
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 1;
+  }
   if (devices_command->parsed()) return run_devices(devices);
+  if (app.got_subcommand("cell")) return cell_command(run);
+  if (app.got_subcommand("campaign")) return run_campaign(campaign);
   return judge_command(folder, judged);
 }

@@ -22,14 +22,17 @@ constexpr int ticks_between_reports = 200;
 class WorldClock final : public hal::VirtualClock {
  public:
   void carry(SimulatedWorld& world) { world_ = &world; }
+  void pace_by_wall() { wall_.emplace(); }
 
  protected:
   void advance(hal::Instant wake) noexcept override {
+    if (wall_) wall_->sleep_until(wake);
     if (world_ != nullptr) world_->step(wake);
   }
 
  private:
   SimulatedWorld* world_ = nullptr;
+  std::optional<hal::SteadyClock> wall_;
 };
 
 Json truth_json(const Verdict& v) {
@@ -86,6 +89,7 @@ std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& option
   hal::Cable scanner_cable{clock, {}}, robot_cable{clock, {.bytes_per_second = serial_bytes_per_second}};
   SimulatedWorld world{options.cell, *plate, scanner_cable.device(), robot_cable.device()};
   clock.carry(world);
+  if (options.real_time) clock.pace_by_wall();
   const auto controller = std::make_unique<Controller>(*config, clock, scanner_cable.host(), robot_cable.host());
   run_to_rest(*controller, *folder->store, clock, options);
 

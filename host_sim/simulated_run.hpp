@@ -20,6 +20,7 @@ struct SimulatedRunOptions {
   CellDescription cell;
   std::filesystem::path out;
   bool write_everything = true;  // false: run.db and no other file; for campaigns that look at the summary only
+  bool real_time = false;        // paced by the wall clock instead of as fast as it goes
   std::function<void(const tasks::CellProgress&)> on_progress;  // now and then, for a terminal
   hal::Duration time_limit = std::chrono::hours{2};  // of cell time: a run that never rests is a defect, and ends here
 };
