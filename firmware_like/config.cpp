@@ -35,6 +35,7 @@ void read_scanner(TomlSection s, ScannerConfig& c) {
   c.field_x_mm = field[0];
   c.field_y_mm = field[1];
   s.number("noise_mm", c.noise_mm, 1e-4, 5);
+  s.number("depth_mm", c.depth_mm, 1, 5000);
   TomlSection mount = s.section("mount");
   std::array<double, 3> translation{0, 140, 300}, zyz{0, 180, 180};
   mount.numbers("translation_mm", translation, -2000, 2000);
@@ -80,6 +81,7 @@ void read_rest(TomlSection& file, CellConfig& c) {
 
   TomlSection plate = file.section("plate");
   plate.number("thickness_mm", c.plate.thickness_mm, 0.5, 200);
+  plate.number("table_z_mm", c.plate.table_z_mm, -1e5, 1e5);
   std::array<double, 2> largest{c.plate.largest_x_mm, c.plate.largest_y_mm};
   plate.numbers("largest_mm", largest, 50, 10000);
   c.plate.largest_x_mm = largest[0];

@@ -25,6 +25,7 @@ struct ScannerConfig {
   int max_points_per_stripe = 500;
   double field_x_mm = 102, field_y_mm = 102;
   double noise_mm = 0.051;
+  double depth_mm = 60;  // z is measured within +-this
   geometry::RigidMotion tip_from_scanner;  // the mount
 };
 
@@ -38,6 +39,7 @@ struct RobotConfig {
 };
 
 struct PlateConfig {
+  double table_z_mm = 0;  // what the plate lies on
   double thickness_mm = 6;
   double largest_x_mm = 500, largest_y_mm = 500;  // the memory plan is made for this
 };

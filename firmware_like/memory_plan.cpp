@@ -57,6 +57,8 @@ tasks::CellSettings cell_settings(const CellConfig& c) {
   s.device_timeout = c.device_timeout;
   s.max_stripes = static_cast<std::size_t>(c.scanner.max_stripes);
   s.max_points = s.max_stripes * static_cast<std::size_t>(c.scanner.max_points_per_stripe);
+  s.depth_mm = c.scanner.depth_mm;
+  s.lowest_plate_z_mm = c.plate.table_z_mm + c.plate.thickness_mm / 2;
   s.max_surface_shots = static_cast<std::size_t>(surface_shots(c));
 
   s.tracker.field_half_x_mm = half_x;

@@ -35,13 +35,13 @@ std::string cell_toml(const CellDescription& d, const PlateInstance& plate, cons
   const Eigen::Vector2d size = plate.plate->bounds().max - plate.plate->bounds().min;
   std::string t = fmt::format("# A simulated cell: plate {}, {} arm.\nschema = 1\n\n[cell]\nname = \"{}\"\n", plate.plate->name(),
                               d.arm == ArmKind::gantry ? "gantry" : "SCARA", plate.plate->name());
-  t += fmt::format("\n[scanner]\nhost = \"127.0.0.1\"\nport = {}\nmax_stripes = {}\nmax_points_per_stripe = {}\nfield_mm = [{}, {}]\nnoise_mm = {}\n",
+  t += fmt::format("\n[scanner]\nhost = \"127.0.0.1\"\nport = {}\nmax_stripes = {}\nmax_points_per_stripe = {}\nfield_mm = [{}, {}]\nnoise_mm = {}\ndepth_mm = {}\n",
                    addresses.scanner_port, d.optics.stripes, d.optics.points_per_stripe, d.optics.field_x_mm, d.optics.field_y_mm,
-                   d.optics.noise_mm);
+                   d.optics.noise_mm, d.optics.depth_mm);
   t += "\n[scanner.mount]\ntranslation_mm = [0, 140, 300]\nzyz_deg = [0, 180, 180]\n";
   t += fmt::format("\n[robot]\ndevice = \"{}\"\nrepeatability_z_mm = {}\n\n[robot.workspace]\n{}", addresses.robot_device, d.drive.errors.z_mm,
                    workspace(d));
-  t += fmt::format("\n[plate]\nthickness_mm = {}\nlargest_mm = [{}, {}]\n", plate.plate->thickness_mm(), roomy(size.x()), roomy(size.y()));
+  t += fmt::format("\n[plate]\nthickness_mm = {}\ntable_z_mm = {}\nlargest_mm = [{}, {}]\n", plate.plate->thickness_mm(), plate.table_z_mm, roomy(size.x()), roomy(size.y()));
   t += fmt::format("\n[start]\ncentre_mm = [{:.3f}, {:.3f}, {:.3f}]\nyaw_deg = {:.3f}\n", centre.x(), centre.y(), centre.z(),
                    std::atan2(axis.y(), axis.x()) / hal::degree);
   return t;

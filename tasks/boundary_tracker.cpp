@@ -182,9 +182,10 @@ ShotPlace BoundaryTracker::carry_out(TrackAction action, const Piece& piece) {
       counts_.turns = counts_.backs = 0;
       next = ahead();
       break;
-    case TrackAction::turn:
+    case TrackAction::turn: {
       ++counts_.turns;
-      if (piece.piece != nullptr && state_ != TrackState::seek_edge && state_ != TrackState::first_side) {
+      const bool following = state_ != TrackState::seek_edge && state_ != TrackState::first_side;
+      if (piece.piece != nullptr && following) {
         move_front(piece);
         next.centre = front_;
       }
@@ -193,7 +194,9 @@ ShotPlace BoundaryTracker::carry_out(TrackAction action, const Piece& piece) {
       next.head_yaw = counts_.turns == 1
                           ? nearest_half_turn(yaw_crossing_both(angle_of(heading_), stripe), place_.head_yaw)
                           : nearest_half_turn(place_.head_yaw + pi / 3, place_.head_yaw);
+      if (!following) return next;  // the same place, and the plate was found from the same hint
       break;
+    }
     case TrackAction::back_up:
       ++counts_.backs;
       next.centre = front_;

@@ -40,6 +40,8 @@ struct CellSettings {
   ShotViewSettings view;
   std::size_t max_stripes = 128, max_points = 65536;  // of a frame
   std::size_t max_surface_shots = 64;
+  double depth_mm = 60;              // the scanner's, to each side: how far off in height the start may be
+  double lowest_plate_z_mm = -1e9;   // what lies lower is the table
   int max_attempts = 3;              // of one shot, before the cell holds
   Duration device_timeout = 10s;     // for scanner and robot to become ready at the start
   std::uint32_t epoch = 1;           // of this run's shot ids (shot_archive.hpp)
@@ -135,7 +137,8 @@ class Cell final : public Task {
   void measure();
   void advance_phase();
   void use_shot(const Order&, const hal::Frame&);
-  void use_boundary_shot(const Order&, const geometry::RigidMotion& world_from_scanner);
+  bool learn_heights(const geometry::RigidMotion& world_from_scanner);
+  void use_boundary_shot(const Order&, const geometry::RigidMotion& world_from_scanner, bool found);
   void plan_surface();
   void next_surface_shot();
 

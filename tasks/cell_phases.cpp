@@ -12,6 +12,9 @@ namespace {
 // Plate points that go into the rough height model: a few of each shot are plenty for six coefficients.
 constexpr std::uint32_t height_stride = 20;
 
+// How far the hint may be off once the plate has been seen: a field's width at 10 degrees.
+constexpr double hint_reach_mm = 18;
+
 // How far inside the outline the hint of a surface shot lies, when the field's centre is outside.
 constexpr double hint_inside_mm = 10;
 
@@ -73,21 +76,37 @@ void Cell::use_shot(const Order& order, const hal::Frame& frame) {
   points_seen_ += frame.point_count;
   const geometry::RigidMotion world_from_scanner = motion_of(order.reported) * settings_.tip_from_scanner;
   const Eigen::Vector3d hint = world_from_scanner.inverse() * hint_in_world(order);
-  const bool found = view_.look(frame, hint);
+  // Nobody knows a plate's height before it was seen; from then on the hint is good to a step's slope.
+  const double reach = order.purpose == ShotPurpose::seek ? settings_.depth_mm : hint_reach_mm;
+  bool found = view_.look(frame, hint, reach);
   if (order.purpose == ShotPurpose::surface) {
     if (found) surface_.fold(view_, world_from_scanner);
     return;
   }
   boundary_places_.push_back(order.place);
-  if (found) {
-    view_.rewind(height_stride);
-    std::array<Eigen::Vector3d, 64> points;
-    for (std::size_t n = view_.next(points); n > 0; n = view_.next(points)) {
-      for (std::size_t i = 0; i < n; ++i) heights_.add(world_from_scanner * points[i]);
+  found = found && learn_heights(world_from_scanner);
+  if (found) surface_.keep(view_, world_from_scanner);
+  use_boundary_shot(order, world_from_scanner, found);
+}
+
+// Adds the shot's heights to the rough model. False when what was found lies on the table: it is the table.
+bool Cell::learn_heights(const geometry::RigidMotion& world_from_scanner) {
+  HeightModel learnt = heights_;
+  double sum = 0;
+  int count = 0;
+  std::array<Eigen::Vector3d, 64> points;
+  view_.rewind(height_stride);
+  for (std::size_t n = view_.next(points); n > 0; n = view_.next(points)) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const Eigen::Vector3d p = world_from_scanner * points[i];
+      learnt.add(p);
+      sum += p.z();
+      ++count;
     }
-    surface_.keep(view_, world_from_scanner);
   }
-  use_boundary_shot(order, world_from_scanner);
+  const bool plate = count > 0 && sum / count > settings_.lowest_plate_z_mm;
+  if (plate) heights_ = learnt;
+  return plate;
 }
 
 Eigen::Vector3d Cell::hint_in_world(const Order& order) const {
@@ -103,9 +122,9 @@ Eigen::Vector3d Cell::hint_in_world(const Order& order) const {
   return {p.x(), p.y(), heights_.at(p.x(), p.y())};
 }
 
-void Cell::use_boundary_shot(const Order& order, const geometry::RigidMotion& world_from_scanner) {
+void Cell::use_boundary_shot(const Order& order, const geometry::RigidMotion& world_from_scanner, bool found) {
   const auto step = tracker_.take({.world_from_scanner = world_from_scanner,
-                                   .plate_found = !view_.runs().empty(),
+                                   .plate_found = found,
                                    .view = view_.boundary()});
   record("tracker", to_string(step.event), to_string(step.from), to_string(step.to),
          hal::Message::format("shot {}: {}", order.number, to_string(step.action)));

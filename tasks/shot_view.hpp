@@ -18,14 +18,15 @@ struct ShotViewSettings {
   geometry::PlateRunSettings runs;
   geometry::BoundaryViewSettings boundary;
   double edge_margin_mm = 1.5;  // points nearer than this to an edge, along the stripe, stay out of the surface
+  double outlier_sigmas = 6;    // a point this far from the median of its neighbours stays out as well
 };
 
 class ShotView {
  public:
   ShotView(std::size_t max_stripes, std::size_t max_points, const ShotViewSettings&);
 
-  // Looks at a frame; `hint` is a point on or near the plate. False when nothing of the plate is there.
-  bool look(const hal::Frame& frame, const Eigen::Vector3d& hint);
+  // Looks at a frame; `hint` is a point on the plate, good to `reach_mm`. False when nothing of the plate is there.
+  bool look(const hal::Frame& frame, const Eigen::Vector3d& hint, double reach_mm);
 
   const geometry::BoundaryViewer::View& boundary() const { return boundary_; }
   std::span<const geometry::PlateRun> runs() const { return runs_; }
@@ -39,6 +40,7 @@ class ShotView {
 
  private:
   bool within_margins(const geometry::PlateRun&, std::uint32_t point) const;
+  bool is_outlier(const geometry::PlateRun&, std::uint32_t point) const;
 
   ShotViewSettings settings_;
   geometry::PlateRunFinder finder_;
