@@ -29,7 +29,7 @@ struct ScannerEvent {
   enum class Kind { ready, exposed, frame, shot_failed, lost };
   Kind kind;
   std::uint32_t shot_id = 0;
-  Message text;  // for shot_failed and lost: what happened
+  Message text{};  // for shot_failed and lost: what happened
 };
 
 struct ScannerInfo {
