@@ -102,6 +102,7 @@ TEST_CASE("a shot: the exposure is reported first, the frame when its last byte 
   Cell cell;
   cell.start();
   const Instant asked = cell.clock.now();
+  CHECK_FALSE(cell.scanner.trigger(0, asked));
   REQUIRE(cell.scanner.trigger(17, asked));
   CHECK(cell.scanner.state() == ScannerState::exposing);
   CHECK_FALSE(cell.scanner.trigger(18, asked));
