@@ -215,100 +215,131 @@ bool vanishes(std::span<const EdgePoint> part, bool at_last, const BoundaryViewS
 
 }  // namespace
 
-// Finds the corners of one piece, cuts it half-way between them, and describes every part.
-void BoundaryViewer::describe(std::size_t begin, std::size_t end, bool hidden_first, bool hidden_last,
-                              const BoundaryViewSettings& settings) {
+namespace {
+
+// Where the points of `part` want two lines rather than one, and those make a corner with at least `least`
+// points on either side: the first point beyond it. 0 where there is none.
+std::size_t corner_within(std::span<const EdgePoint> part, std::size_t least,
+                          const BoundaryViewSettings& settings) {
   const std::size_t min_side = settings.min_side_points;
-  const std::span<const EdgePoint> all(points_);
-  if (end - begin < min_side) return;
+  if (part.size() < min_side + least) return 0;
+  const EdgeLine one = fit_edge_line(part);
+  double squares = 0, largest = 0;
+  for (const EdgePoint& p : part) {
+    const double r = one.distance(p.position.head<2>());
+    squares += r * r, largest = std::max(largest, std::abs(r));
+  }
+  const double rms = std::sqrt(squares / static_cast<double>(part.size()));
+  if (rms <= settings.max_line_rms_mm && largest <= 4 * settings.max_line_rms_mm) return 0;
+  // Two lines may split a piece with two corners between them; the point farthest from the chord is then near
+  // one. Both searches may leave a side with two points: forced to more, they would borrow them from the
+  // other side.
+  for (const std::size_t split : {best_split(part, 2), split_at_farthest(part, tangent_stretch_mm, 2)}) {
+    if (split < least || part.size() - split < least) continue;
+    const EdgeLine a = fit_edge_line(last_stretch(part.first(split), tangent_stretch_mm, min_side));
+    const EdgeLine b = fit_edge_line(first_stretch(part.subspan(split), tangent_stretch_mm, min_side));
+    if (std::abs(turn_between(a.direction, b.direction)) >= settings.min_corner_turn) return split;
+  }
+  return 0;
+}
 
-  // True when the points from `from` to `to` want two lines rather than one, and those make a corner.
-  const auto corner_within = [&](std::size_t from, std::size_t to, std::size_t least) -> std::size_t {
-    const auto part = all.subspan(from, to - from);
-    if (part.size() < min_side + least) return 0;
-    const EdgeLine one = fit_edge_line(part);
-    double squares = 0, largest = 0;
-    for (const EdgePoint& p : part) {
-      const double r = one.distance(p.position.head<2>());
-      squares += r * r, largest = std::max(largest, std::abs(r));
-    }
-    const double rms = std::sqrt(squares / static_cast<double>(part.size()));
-    if (rms <= settings.max_line_rms_mm && largest <= 4 * settings.max_line_rms_mm) return 0;
-    // Two lines may split a piece with two corners between them; the point farthest from the chord is then
-    // near one. Both searches may leave a side with two points: forced to more, they would borrow them from
-    // the other side.
-    for (const std::size_t split : {best_split(part, 2), split_at_farthest(part, tangent_stretch_mm, 2)}) {
-      if (split < least || part.size() - split < least) continue;
-      const EdgeLine a = fit_edge_line(last_stretch(part.first(split), tangent_stretch_mm, min_side));
-      const EdgeLine b = fit_edge_line(first_stretch(part.subspan(split), tangent_stretch_mm, min_side));
-      if (std::abs(turn_between(a.direction, b.direction)) >= settings.min_corner_turn) return from + split;
-    }
-    return 0;
-  };
-
-  std::array<std::size_t, max_corners + 2> cuts{begin, end};
+// A piece's begin, its corners, its end.
+struct Cuts {
+  std::array<std::size_t, max_corners + 2> at{};
   std::size_t count = 2;
-  for (std::size_t k = 0; k + 1 < count && count < cuts.size();) {
-    const std::size_t split = corner_within(cuts[k], cuts[k + 1], min_side);
+};
+
+Cuts find_corners(std::span<const EdgePoint> all, std::size_t begin, std::size_t end,
+                  const BoundaryViewSettings& settings) {
+  Cuts cuts{.at = {begin, end}};
+  auto& at = cuts.at;
+  for (std::size_t k = 0; k + 1 < cuts.count && cuts.count < at.size();) {
+    const std::size_t split =
+        corner_within(all.subspan(at[k], at[k + 1] - at[k]), settings.min_side_points, settings);
     if (split == 0) {
       ++k;
       continue;
     }
-    std::copy_backward(cuts.begin() + k + 1, cuts.begin() + count, cuts.begin() + count + 1);
-    cuts[k + 1] = split;
-    ++count;
+    std::copy_backward(at.begin() + k + 1, at.begin() + cuts.count, at.begin() + cuts.count + 1);
+    at[k + 1] = at[k] + split;
+    ++cuts.count;
   }
   // The first splits were found before the others were known: place each again between its neighbours, then
   // ask once more whether it is a corner.
   for (int pass = 0; pass < 2; ++pass) {
-    for (std::size_t k = 1; k + 1 < count;) {
-      const std::size_t split = corner_within(cuts[k - 1], cuts[k + 1], min_side);
+    for (std::size_t k = 1; k + 1 < cuts.count;) {
+      const auto between = all.subspan(at[k - 1], at[k + 1] - at[k - 1]);
+      const std::size_t split = corner_within(between, settings.min_side_points, settings);
       if (split != 0) {
-        cuts[k++] = split;
+        at[k] = at[k - 1] + split;
+        ++k;
       } else {
-        std::copy(cuts.begin() + k + 1, cuts.begin() + count, cuts.begin() + k);
-        --count;
+        std::copy(at.begin() + k + 1, at.begin() + cuts.count, at.begin() + k);
+        --cuts.count;
       }
     }
   }
+  return cuts;
+}
 
-  // A stub of two or three points beyond a corner has no tangent: the side ends at the corner, and unless the
-  // stub leads out of the field, the rest of the boundary hides between stripes.
-  const std::size_t stub_last = corner_within(cuts[count - 2], end, 2);
-  if (stub_last != 0 && end - stub_last < min_side) {
-    hidden_last |= stub_hides(points_[end - 1], points_[end - 2], settings);
-    cuts[count - 1] = end = stub_last;
-  } else {
-    hidden_last |= vanishes(all.subspan(begin, end - begin), true, settings);
+// A stub of two or three points beyond a corner has no tangent: the side ends at the corner, and unless the
+// stub leads out of the field, the rest of the boundary hides between stripes. Says whether it hides at the
+// last, or first, end.
+bool trim_last(std::span<const EdgePoint> all, Cuts& cuts, const BoundaryViewSettings& settings) {
+  const std::size_t from = cuts.at[cuts.count - 2], end = cuts.at[cuts.count - 1];
+  const std::size_t split = corner_within(all.subspan(from, end - from), 2, settings);
+  if (split == 0 || end - from - split >= settings.min_side_points) {
+    return vanishes(all.subspan(cuts.at[0], end - cuts.at[0]), true, settings);
   }
-  const std::size_t stub_first = corner_within(begin, cuts[1], 2);
-  if (stub_first != 0 && stub_first - begin < min_side) {
-    hidden_first |= stub_hides(points_[begin], points_[begin + 1], settings);
-    cuts[0] = begin = stub_first;
-  } else {
-    hidden_first |= vanishes(all.subspan(begin, end - begin), false, settings);
+  cuts.at[cuts.count - 1] = from + split;
+  return stub_hides(all[end - 1], all[end - 2], settings);
+}
+
+bool trim_first(std::span<const EdgePoint> all, Cuts& cuts, const BoundaryViewSettings& settings) {
+  const std::size_t begin = cuts.at[0], to = cuts.at[1];
+  const std::size_t split = corner_within(all.subspan(begin, to - begin), 2, settings);
+  if (split == 0 || split >= settings.min_side_points) {
+    return vanishes(all.subspan(begin, cuts.at[cuts.count - 1] - begin), false, settings);
   }
+  cuts.at[0] = begin + split;
+  return stub_hides(all[begin], all[begin + 1], settings);
+}
+
+}  // namespace
+
+// Finds the corners of one piece, cuts it half-way between them, and describes every part.
+void BoundaryViewer::describe(std::size_t begin, std::size_t end, bool hidden_first, bool hidden_last,
+                              const BoundaryViewSettings& settings) {
+  if (end - begin < settings.min_side_points) return;
+  const std::span<const EdgePoint> all(points_);
+  Cuts cuts = find_corners(all, begin, end, settings);
+  hidden_last |= trim_last(all, cuts, settings);
+  hidden_first |= trim_first(all, cuts, settings);
 
   BoundaryPiece piece;
-  if (count == 2) {
-    const auto part = all.subspan(begin, end - begin);
-    if (part.size() < min_side) return;
-    piece.first = static_cast<std::uint32_t>(begin), piece.count = static_cast<std::uint32_t>(end - begin);
-    piece.hidden_first = hidden_first, piece.hidden_last = hidden_last;
-    piece.tangent_first = fit_edge_line(first_stretch(part, tangent_stretch_mm, min_side)).direction;
-    piece.tangent_last = fit_edge_line(last_stretch(part, tangent_stretch_mm, min_side)).direction;
-    piece.turn = turn_between(piece.tangent_first, piece.tangent_last);
-    piece.rms_mm = fit_edge_line(part).rms_mm;
-    if (pieces_.size() < pieces_.capacity()) pieces_.push_back(piece);
-    return;
-  }
+  piece.hidden_first = hidden_first, piece.hidden_last = hidden_last;
+  const std::size_t count = cuts.count;
+  if (count == 2) return describe_side(cuts.at[0], cuts.at[1], piece, settings);
   for (std::size_t k = 1; k + 1 < count; ++k) {
-    const std::size_t from = k == 1 ? begin : (cuts[k - 1] + cuts[k]) / 2;
-    const std::size_t to = k + 2 == count ? end : (cuts[k] + cuts[k + 1]) / 2;
+    const std::size_t from = k == 1 ? cuts.at[0] : (cuts.at[k - 1] + cuts.at[k]) / 2;
+    const std::size_t to = k + 2 == count ? cuts.at[count - 1] : (cuts.at[k] + cuts.at[k + 1]) / 2;
     piece.hidden_first = k == 1 && hidden_first;
     piece.hidden_last = k + 2 == count && hidden_last;
-    describe_corner(from, cuts[k], to, piece, settings);
+    describe_corner(from, cuts.at[k], to, piece, settings);
   }
+}
+
+void BoundaryViewer::describe_side(std::size_t begin, std::size_t end, BoundaryPiece piece,
+                                   const BoundaryViewSettings& settings) {
+  const std::size_t min_side = settings.min_side_points;
+  const auto part = std::span<const EdgePoint>(points_).subspan(begin, end - begin);
+  if (part.size() < min_side || pieces_.size() == pieces_.capacity()) return;
+  piece.first = static_cast<std::uint32_t>(begin), piece.count = static_cast<std::uint32_t>(end - begin);
+  piece.tangent_first = fit_edge_line(first_stretch(part, tangent_stretch_mm, min_side)).direction;
+  piece.tangent_last = fit_edge_line(last_stretch(part, tangent_stretch_mm, min_side)).direction;
+  piece.turn = turn_between(piece.tangent_first, piece.tangent_last);
+  piece.rms_mm = fit_edge_line(part).rms_mm;
+  pieces_.push_back(piece);
 }
 
 void BoundaryViewer::describe_corner(std::size_t begin, std::size_t split, std::size_t end,

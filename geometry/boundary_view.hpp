@@ -78,6 +78,7 @@ class BoundaryViewer {
   void drop_false_points(std::size_t begin, std::size_t& end);
   void describe(std::size_t begin, std::size_t end, bool hidden_first, bool hidden_last,
                 const BoundaryViewSettings&);
+  void describe_side(std::size_t begin, std::size_t end, BoundaryPiece, const BoundaryViewSettings&);
   void describe_corner(std::size_t begin, std::size_t split, std::size_t end, BoundaryPiece,
                        const BoundaryViewSettings&);
 

@@ -204,17 +204,26 @@ void PlateRunFinder::trim_ends(const StripeView& stripe, const PlateRunSettings&
     if (piece.count < line_points + trim_points) continue;
     const auto good = std::span<const std::uint32_t>(good_).subspan(piece.begin, piece.count);
     const double n = line_points;
-    const auto strays = [&](const StripeLine& line, std::uint32_t i) {
+    const auto strays = [&](const StripeLine& line, std::uint32_t i, std::uint32_t inside) {
       // Standard deviation of a point against a line through n others, extrapolated by up to three points.
       const double reach = (n / 2 + trim_points) / n;
       const double sigma = settings.noise_mm * std::sqrt(1 + 1 / n + 12 * reach * reach / n);
-      return std::abs(stripe.z[i] - line.z_at(stripe.y[i])) > trim_sigmas * sigma;
+      const double fall = std::abs(stripe.z[i] - stripe.z[inside]),
+                   along = std::abs(stripe.y[i] - stripe.y[inside]);
+      return std::abs(stripe.z[i] - line.z_at(stripe.y[i])) > trim_sigmas * sigma &&
+             fall > HeightFilter::max_slope * along;
     };
+    // From inside outwards: whatever lies beyond the first wall point goes with it.
     std::uint32_t at_first = 0, at_last = 0;
+    const std::size_t end = good.size() - 1;
     const StripeLine head = fit_line(stripe, good.subspan(trim_points, line_points));
-    while (at_first < trim_points && strays(head, good[at_first])) ++at_first;
+    for (std::uint32_t k = trim_points; k-- > 0 && at_first == 0;) {
+      if (strays(head, good[k], good[k + 1])) at_first = k + 1;
+    }
     const StripeLine tail = fit_line(stripe, good.last(line_points + trim_points).first(line_points));
-    while (at_last < trim_points && strays(tail, good[good.size() - 1 - at_last])) ++at_last;
+    for (std::uint32_t k = trim_points; k-- > 0 && at_last == 0;) {
+      if (strays(tail, good[end - k], good[end - k - 1])) at_last = k + 1;
+    }
     piece.begin += at_first;
     piece.count -= at_first + at_last;
   }

@@ -168,6 +168,7 @@ TEST_CASE("the hint selects the region, and a hint far from everything is an err
   PlateRunFinder finder(100, 50'000);
   const auto plate = finder.find(frame.views, {0, -20, 1}, {});
   REQUIRE(plate.has_value());
+  REQUIRE(plate->size() == 100);
   CHECK((*plate)[50].edge_first.z() == doctest::Approx(0).epsilon(0.2));
   const auto ground = finder.find(frame.views, {0, 45, -6}, {});
   REQUIRE(ground.has_value());
