@@ -68,13 +68,18 @@ TEST_CASE("joint 4 takes the shortest way round and unwinds at its limit") {
   const auto arm = make_scara({});
   auto joints = *arm->joints_for(down_at(500, 0, 350, 0), arm->home());
   double before = joints[3];
-  for (double roll = 20; roll <= 360; roll += 20) {
-    joints = *arm->joints_for(down_at(500, 0, 350, roll), joints);
+  int unwound = 0;
+  for (double roll = 20; roll <= 720; roll += 20) {
+    const auto turned = arm->joints_for(down_at(500, 0, 350, roll), joints);
+    REQUIRE(turned.has_value());
+    joints = *turned;
     const double moved = std::abs(joints[3] - before);
     CHECK((moved == doctest::Approx(20 * hal::degree) || moved == doctest::Approx(340 * hal::degree)));
     CHECK(std::abs(joints[3]) <= 277 * hal::degree);
+    unwound += moved > 5;
     before = joints[3];
   }
+  CHECK(unwound >= 1);
 }
 
 TEST_CASE("one joint alone moves as the closed form of a trapezoid says") {
@@ -105,7 +110,7 @@ TEST_CASE("braking ends a motion after v / a, v^2 / 2a farther on") {
 TEST_CASE("errors are drawn at each stop with their sigma, and the encoders do not show them") {
   ArmDrive drive(make_scara({}), {}, 3);
   hal::Instant now{0};
-  double squares = 0;
+  double squares = 0, sum = 0;
   constexpr int stops = 400;
   for (int k = 0; k < stops; ++k) {
     const auto target = down_at(500 + k % 7, 30 - k % 5, 330, 180);
@@ -114,8 +119,10 @@ TEST_CASE("errors are drawn at each stop with their sigma, and the encoders do n
     CHECK(distance(drive.reported_pose(now), target) < 1e-3);
     const double x_error = drive.true_world_from_tip(now).translation().x() - target.x_mm;
     squares += x_error * x_error;
+    sum += x_error;
   }
-  CHECK(std::sqrt(squares / stops) == doctest::Approx(0.038).epsilon(0.12));
+  CHECK(std::sqrt(squares / stops) == doctest::Approx(0.038).epsilon(0.12).scale(0));
+  CHECK(std::abs(sum / stops) < 4 * 0.038 / std::sqrt(stops));
 }
 
 TEST_CASE("between stops the true pose never jumps") {
