@@ -8,7 +8,7 @@ namespace moldloft::host_sim {
 std::expected<JointMotion, MotionError> plan_motion(const Arm& arm, const Joints& from, const hal::Pose& to,
                                                     double speed_percent) {
   if (!hal::is_finite(to)) {
-    return std::unexpected(MotionError{error_location_out_of_range, "the target is not a number"});
+    return std::unexpected(MotionError{"the target is not a number"});
   }
   const auto joints = arm.joints_for(to, from);
   if (!joints) return std::unexpected(joints.error());
@@ -36,8 +36,7 @@ std::expected<double, MotionError> heading_of(const hal::Pose& pose) {
   const double pitch = geometry::wrapped_angle(pose.pitch);
   if (std::abs(std::abs(pitch) - std::numbers::pi) > down) {
     return std::unexpected(
-        MotionError{error_location_out_of_range,
-                    hal::Message::format("the tip must point straight down: pitch is {:.3f} degrees, "
+        MotionError{hal::Message::format("the tip must point straight down: pitch is {:.3f} degrees, "
                                          "the arm can only 180",
                                          pose.pitch / hal::degree)});
   }
@@ -51,11 +50,9 @@ std::expected<void, MotionError> check_limits(const JointLimits& limits, const J
     if (joints[i] >= limits[i].low - slack && joints[i] <= limits[i].high + slack) continue;
     const bool linear = limits[i].name[0] == 'x' || limits[i].name[0] == 'y' || limits[i].name[0] == 'z';
     const double unit = linear ? 1.0 : hal::degree;
-    return std::unexpected(
-        MotionError{error_location_out_of_range,
-                    hal::Message::format("{} would stand at {:.1f} {}, its limits are {:.1f} and {:.1f}",
-                                         limits[i].name, joints[i] / unit, linear ? "mm" : "degrees",
-                                         limits[i].low / unit, limits[i].high / unit)});
+    return std::unexpected(MotionError{hal::Message::format(
+        "{} would stand at {:.1f} {}, its limits are {:.1f} and {:.1f}", limits[i].name, joints[i] / unit,
+        linear ? "mm" : "degrees", limits[i].low / unit, limits[i].high / unit)});
   }
   return {};
 }

@@ -6,7 +6,7 @@
 // Units        mm, rad
 // Thread       one thread
 // Allocation   at construction only
-// Failure      std::expected with an error number and one line that names joint and limit
+// Failure      std::expected with one line that names joint and limit
 #pragma once
 
 #include <expected>
@@ -20,18 +20,7 @@
 
 namespace moldloft::host_sim {
 
-// Error numbers that the robot server sends on, in the ranges where V+ has its own for the same.
-constexpr int error_location_too_close = -618;
-constexpr int error_location_too_far = -617;
-constexpr int error_location_out_of_range = -610;  // a joint beyond its limit, a tip that does not point down
-constexpr int error_not_calibrated = -605;
-constexpr int error_no_power = -604;
-constexpr int error_emergency_stop = -643;
-constexpr int error_stopped = -400;  // motion ended before its target: STP, SYN or watchdog
-constexpr int error_watchdog = -401;
-
 struct MotionError {
-  int code = 0;
   hal::Message text;
 };
 

@@ -1,25 +1,39 @@
 #include "host_sim/cell_options.hpp"
 
-#include <map>
 #include <string>
 
 namespace moldloft::host_sim {
 
+namespace {
+
+// An option whose words are looked up; an unknown word is refused with the words that are known.
+template <typename Value, typename Lookup>
+CLI::Option* add_named(CLI::App& command, const std::string& name, Value& value, Lookup lookup,
+                       const std::string& about) {
+  return command.add_option_function<std::string>(
+      name,
+      [&value, lookup, name](const std::string& word) {
+        const auto found = lookup(word);
+        if (!found) throw CLI::ValidationError(name, found.error().what);
+        value = *found;
+      },
+      about);
+}
+
+std::expected<LengthUnit, SimError> unit_named(std::string_view name) {
+  if (name == "mm") return LengthUnit::millimetre;
+  if (name == "m") return LengthUnit::metre;
+  return std::unexpected(SimError{"no unit is called '" + std::string(name) + "': choose mm or m"});
+}
+
+}  // namespace
+
 void add_cell_options(CLI::App& command, CellDescription& cell) {
-  static const std::map<std::string, LengthUnit> units = {{"mm", LengthUnit::millimetre},
-                                                          {"m", LengthUnit::metre}};
-  static const std::map<std::string, ArmKind> arms = {{"scara", ArmKind::scara}, {"gantry", ArmKind::gantry}};
-  static const std::map<std::string, OutlineKind> outlines = [] {
-    std::map<std::string, OutlineKind> names;
-    for (const auto name : outline_names()) names.emplace(name, *outline_named(name));
-    return names;
-  }();
   command.add_option("--plate", cell.plate, "flat, cylinder, saddle, twist, dome, wave, or a mesh FILE.ply")
       ->capture_default_str();
-  command.add_option("--unit", cell.unit, "unit of the mesh file: mm or m")
-      ->transform(CLI::CheckedTransformer(units));
-  command.add_option("--outline", cell.outline, "square, rectangle, trapezoid or parallelogram")
-      ->transform(CLI::CheckedTransformer(outlines));
+  add_named(command, "--unit", cell.unit, unit_named, "unit of the mesh file: mm (default) or m");
+  add_named(command, "--outline", cell.outline, outline_named,
+            "square (default), rectangle, trapezoid or parallelogram");
   command.add_option("--width", cell.sizes.width_mm, "lower side, mm")->check(CLI::PositiveNumber);
   command.add_option("--depth", cell.sizes.depth_mm, "extent across it, mm")->check(CLI::PositiveNumber);
   command.add_option("--top-width", cell.sizes.top_width_mm, "trapezoid: upper side, mm")
@@ -29,7 +43,7 @@ void add_cell_options(CLI::App& command, CellDescription& cell) {
   command.add_option("--amplitude", cell.amplitude_mm, "of saddle, twist, dome, wave, mm")
       ->capture_default_str();
   command.add_option("--radius", cell.radius_mm, "of the cylinder, mm")->capture_default_str();
-  command.add_option("--arm", cell.arm, "scara or gantry")->transform(CLI::CheckedTransformer(arms));
+  add_named(command, "--arm", cell.arm, arm_named, "scara (default) or gantry");
   command.add_option("--seed", cell.seed, "draws placement, noise and errors")->capture_default_str();
 }
 

@@ -2,13 +2,22 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 namespace moldloft::host_sim {
 
 namespace robot_line = hal::robot_line;
+using robot_line::Error;
+using robot_line::Event;
 using robot_line::Refusal;
 using robot_line::Reply;
 using robot_line::Verb;
+
+namespace {
+
+constexpr hal::Duration event_period = std::chrono::seconds{1};  // of EVT, until SYN
+
+}  // namespace
 
 RobotServer::RobotServer(hal::ByteLink& link, ArmDrive drive, const RobotTimes& times)
     : link_(link), drive_(std::move(drive)), times_(times) {}
@@ -32,16 +41,13 @@ void RobotServer::power_cycle(hal::Instant now) {
   if (fate_ == Fate::under_way) busy_until_ = stands_at_ = drive_.stands_at();
   fate_ = Fate::none;
   synchronised_ = calibrated_ = calibrating_ = false;
-  last_number_ = last_error_ = 0;
+  last_number_ = last_error_ = event_ = 0;
   line_used_ = out_used_ = 0;
 }
 
 void RobotServer::press_emergency_stop(hal::Instant now) {
   emergency_stop_ = true;
-  last_error_ = error_emergency_stop;
-  abort_work(error_emergency_stop, now);
-  synchronised_ = false;
-  report_event(error_emergency_stop);
+  raise(Event::emergency_stop, now);
 }
 
 void RobotServer::receive(hal::Instant now) {
@@ -83,9 +89,9 @@ void RobotServer::answer_question(const robot_line::Command& question, hal::Inst
   switch (question.verb) {
     case Verb::syn:
       // A host that begins anew knows nothing of a motion still under way: it must not go on behind its back.
-      abort_work(error_stopped, now);
+      abort_work(now);
       fate_ = Fate::none;
-      last_number_ = 0;
+      last_number_ = event_ = 0;
       executions_.fill(0);
       synchronised_ = !emergency_stop_ && power_;
       reply.nonce = question.nonce;
@@ -103,7 +109,7 @@ void RobotServer::answer_question(const robot_line::Command& question, hal::Inst
       reply.has_pose = true;
       break;
     case Verb::stp:
-      abort_work(error_stopped, now);
+      abort_work(now);
       break;
     default:
       break;  // PNG says only that both are there
@@ -125,20 +131,21 @@ void RobotServer::take_numbered(const robot_line::Command& command, hal::Instant
 }
 
 void RobotServer::execute(const robot_line::Command& command, hal::Instant now) {
-  const auto failed = [this](int code) {
+  const auto failed = [this](Error error, std::string_view why) {
     fate_ = Fate::failed;
-    fate_code_ = last_error_ = code;
+    fate_code_ = last_error_ = std::to_underlying(error);
+    last_refusal_ = why;
   };
-  if (emergency_stop_ || !power_) return failed(emergency_stop_ ? error_emergency_stop : error_no_power);
-  if (drive_.moving(now)) return failed(error_stopped);  // still braking after STP or SYN
+  if (emergency_stop_ || !power_) return failed(Error::arm_off, "the arm has no power");
+  if (drive_.moving(now)) return failed(Error::stopped, "the arm is still braking");
   if (command.verb == Verb::cal) {
     ++counters_.calibrations;
     calibrating_ = true;
     return begin_work(now, now + times_.calibration, now + times_.calibration);
   }
-  if (!calibrated_) return failed(error_not_calibrated);
+  if (!calibrated_) return failed(Error::not_calibrated, "the arm is not calibrated");
   if (const auto started = drive_.start(command.pose, command.speed_percent, now); !started) {
-    return failed(started.error().code);
+    return failed(Error::out_of_reach, started.error().text);
   }
   ++counters_.motions;
   counters_.most_executions =
@@ -163,24 +170,41 @@ void RobotServer::finish_work(hal::Instant now) {
 }
 
 // Ends what is under way, where the brakes bring it to stand; its number is answered by ERR from now on.
-void RobotServer::abort_work(int code, hal::Instant now) {
+void RobotServer::abort_work(hal::Instant now) {
   if (fate_ != Fate::under_way) return;
   drive_.stop(now);
   stands_at_ = busy_until_ = calibrating_ ? now : drive_.stands_at();
   calibrating_ = false;
   fate_ = Fate::failed;
-  fate_code_ = last_error_ = code;
+  fate_code_ = last_error_ = std::to_underlying(Error::stopped);
   ++commands_done_;
   send_fate();
 }
 
 void RobotServer::watch(hal::Instant now) {
-  if (!synchronised_ || now - last_line_ < times_.watchdog) return;
-  ++counters_.watchdogs;
-  abort_work(error_stopped, now);
+  if (synchronised_ && now - last_line_ >= times_.watchdog) {
+    ++counters_.watchdogs;
+    raise(Event::watchdog, now);
+  }
+  repeat_event(now);
+}
+
+// Stops whatever is under way; numbered lines are refused until SYN.
+void RobotServer::raise(Event event, hal::Instant now) {
+  abort_work(now);
   synchronised_ = false;
-  last_error_ = error_watchdog;
-  report_event(error_watchdog);
+  event_ = std::to_underlying(event);
+  event_said_ = now - event_period;
+  repeat_event(now);
+}
+
+void RobotServer::repeat_event(hal::Instant now) {
+  if (event_ == 0 || now - event_said_ < event_period) return;
+  event_said_ = now;
+  Reply reply;
+  reply.verb = Verb::evt;
+  reply.code = event_;
+  send(reply);
 }
 
 void RobotServer::send_fate() {
@@ -212,13 +236,6 @@ void RobotServer::refuse(int number, Refusal refusal) {
   reply.verb = Verb::nak;
   reply.refusal = refusal;
   reply.last_number = last_number_;
-  send(reply);
-}
-
-void RobotServer::report_event(int code) {
-  Reply reply;
-  reply.verb = Verb::evt;
-  reply.code = code;
   send(reply);
 }
 

@@ -47,6 +47,8 @@ class RobotServer {
   const RobotCounters& counters() const noexcept { return counters_; }
   std::uint64_t commands_done() const noexcept { return commands_done_; }
   const ArmDrive& drive() const noexcept { return drive_; }
+  // Why the last command was refused, in words that the wire has no room for.
+  std::string_view last_refusal() const noexcept { return last_refusal_; }
 
  private:
   // How the last numbered command stands.
@@ -59,12 +61,13 @@ class RobotServer {
   void execute(const hal::robot_line::Command&, hal::Instant now);
   void begin_work(hal::Instant now, hal::Instant stands_at, hal::Instant until);
   void finish_work(hal::Instant now);
-  void abort_work(int code, hal::Instant now);
+  void abort_work(hal::Instant now);
   void watch(hal::Instant now);
   void send_fate();
   void send(const hal::robot_line::Reply&);
   void refuse(int number, hal::robot_line::Refusal);
-  void report_event(int code);
+  void raise(hal::robot_line::Event, hal::Instant now);
+  void repeat_event(hal::Instant now);
   void flush();
 
   hal::ByteLink& link_;
@@ -81,6 +84,9 @@ class RobotServer {
   hal::Pose fate_pose_;  // of one that is done
   hal::Instant busy_from_{-1}, stands_at_{-1}, busy_until_{-1}, last_line_{0};
   std::uint64_t commands_done_ = 0;
+  hal::Message last_refusal_;
+  int event_ = 0;  // said once a second until SYN; 0: none
+  hal::Instant event_said_{0};
   std::array<std::uint32_t, hal::robot_line::last_number + 1> executions_{};
 
   std::array<char, hal::robot_line::max_length> line_{};

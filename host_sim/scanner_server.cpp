@@ -165,9 +165,6 @@ void ScannerServer::answer_config(const psc1::Header& header, std::span<const st
   const auto asked = psc1::decode_config(payload);
   if (!greeted_) return refuse(header.request_id, Status::bad_state, 0, "HELLO comes first");
   if (!asked) return refuse(header.request_id, Status::bad_argument, 0, psc1::to_string(asked.error()));
-  if (phase_ == Phase::exposing || phase_ == Phase::computing) {
-    return refuse(header.request_id, Status::busy, shot_id_, "a shot is under way");
-  }
   const auto& s = optics_.settings();
   raster_ = {every(s.stripes, asked->stripes), every(s.points_per_stripe, asked->points_per_stripe)};
   config_ = *asked;

@@ -75,14 +75,12 @@ class ScaraArm final : public Arm {
 
   std::unexpected<MotionError> too_far(double reach) const {
     return std::unexpected(
-        MotionError{error_location_too_far,
-                    hal::Message::format("the tip would be {:.1f} mm from the base, the arm reaches {:.1f}",
+        MotionError{hal::Message::format("the tip would be {:.1f} mm from the base, the arm reaches {:.1f}",
                                          reach, s_.link_1_mm + s_.link_2_mm)});
   }
   std::unexpected<MotionError> too_close(double reach) const {
     const double a = s_.link_1_mm, b = s_.link_2_mm;
     return std::unexpected(MotionError{
-        error_location_too_close,
         hal::Message::format("the tip would be {:.1f} mm from the base, joint 2 folds no further than {:.1f}",
                              reach, std::sqrt(a * a + b * b + 2 * a * b * std::cos(s_.j2_limit)))});
   }

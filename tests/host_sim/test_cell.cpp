@@ -15,7 +15,7 @@ namespace robot_line = moldloft::hal::robot_line;
 TEST_CASE("every plate with every outline finds a place by seed, and the start lies well inside it") {
   for (const auto shape : shape_names()) {
     for (const auto outline : outline_names()) {
-      for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      for (std::uint64_t seed = 1; seed <= 12; ++seed) {
         CAPTURE(shape);
         CAPTURE(outline);
         CAPTURE(seed);
@@ -112,6 +112,16 @@ TEST_CASE("the world counts where the time goes between the first command and th
   CHECK(std::chrono::abs(times.total - 2601ms) <= 3ms);
   CHECK(std::chrono::abs(times.idle - 500ms) <= 3ms);
   CHECK(times.standing_fraction() == doctest::Approx(601.0 / 2601).epsilon(0.01));
+
+  say({0, robot_line::Verb::syn, {}, 0, 2});  // the watchdog has struck meanwhile
+  run(10ms);
+  say({1, robot_line::Verb::cal, {}, 0, 0});  // the arm busy and the scanner too: no time counts twice
+  run(100ms);
+  trigger(2);
+  run(2500ms);
+  const auto more = world.times();
+  CHECK(std::chrono::abs(more.idle - times.idle - (more.total - times.total - 2s)) <= 1ms);
+  CHECK(more.computing == 200ms);
 }
 
 TEST_CASE("the scanner looks from where the arm truly is, mount error included") {

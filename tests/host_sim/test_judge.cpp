@@ -15,7 +15,8 @@ namespace {
 // The plate's own saddle as a B-spline: z is quadratic, x and y linear, so a bicubic net holds it exactly.
 // Blossoms: linear functions have Greville abscissae as coefficients, x^2 has the mean of pairwise knot
 // products.
-geometry::BSplineSurface saddle_surface(const PlateInstance& plate, double lift_mm, double stretch_mm) {
+geometry::BSplineSurface saddle_surface(const PlateInstance& plate, double lift_mm, double stretch_mm,
+                                        double amplitude_mm = 10) {
   geometry::BSplineSurface s;
   s.knots_u = s.knots_v = geometry::uniform_clamped_knots(3);
   constexpr int n = 6;
@@ -34,7 +35,7 @@ geometry::BSplineSurface saddle_surface(const PlateInstance& plate, double lift_
   for (auto* net : {&s.x, &s.y, &s.z}) net->resize(n, n);
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) {
-      const double z = 10 * (square(i) - square(j)) / (152.5 * 152.5) + lift_mm;
+      const double z = amplitude_mm * (square(i) - square(j)) / (152.5 * 152.5) + lift_mm;
       const Eigen::Vector3d p = plate.world_from_plate() * Eigen::Vector3d{linear(i), linear(j), z};
       s.x(i, j) = p.x();
       s.y(i, j) = p.y();
@@ -75,6 +76,22 @@ TEST_CASE("a surface lifted by 0.1 mm lies 0.1 cos(slope) off along the normal")
     ++count;
   }
   CHECK(verdict->normal_rms_mm == doctest::Approx(std::sqrt(squares / count)));
+}
+
+TEST_CASE(
+    "deviations run along the true normal: a flat surface over the saddle is met at height / cos(slope)") {
+  const auto plate = saddle();
+  const auto verdict = judge(plate, saddle_surface(plate, 0, 0, 0), plate.corners_in_world());
+  REQUIRE(verdict.has_value());
+  for (const auto& d : verdict->grid) {
+    if (std::isnan(d.normal_mm)) continue;
+    const Eigen::Vector3d p =
+        plate.world_from_plate().inverse() * Eigen::Vector3d{d.world.x(), d.world.y(), 0};
+    if (p.head<2>().cwiseAbs().maxCoeff() > 145)
+      continue;  // at the border the normal may pass the surface by
+    const double height = plate.plate->height(p.x(), p.y()), cosine = plate.plate->normal(p.x(), p.y()).z();
+    CHECK(d.normal_mm == doctest::Approx(-height / cosine).epsilon(1e-7));
+  }
 }
 
 TEST_CASE("an outline 0.25 mm too large is 0.25 sqrt 2 off at its corners") {

@@ -1,5 +1,6 @@
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -115,6 +116,18 @@ TEST_CASE("a tilted mesh is laid flat, and its heights are those of the sheet") 
   }
   CHECK_FALSE(p.inside(104, 0));
   CHECK_FALSE(p.inside(0, -53));
+}
+
+TEST_CASE("beside a ridge each point takes its own side's triangle") {
+  auto mesh = sheet(40, 20, 5.0, [](double x, double) { return 0.2 * std::abs(x - 100); });
+  const auto plate = make_mesh_plate("roof", mesh, 6);
+  REQUIRE(plate.has_value());
+  const double ridge = (*plate)->height(0, 0);
+  for (double x = -98; x < 98; x += 0.7) {
+    for (double y = -48; y < 48; y += 3.1) {
+      CHECK(std::abs((*plate)->height(x, y) - ridge - 0.2 * std::abs(x)) < 0.02);
+    }
+  }
 }
 
 TEST_CASE("a sheet that folds back over itself is not explicit") {

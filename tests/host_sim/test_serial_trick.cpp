@@ -79,6 +79,26 @@ TEST_CASE("without the shim libserialport refuses it: the shim is what makes it 
   CHECK(probe(name_of_this_test(), false) == 3);
 }
 
+TEST_CASE("the terminal is open while a program has it open") {
+  const auto link = PtyLink::create(name_of_this_test());
+  REQUIRE(link.has_value());
+  auto& device = **link;
+  device.open();
+  CHECK(device.state() == hal::LinkState::opening);
+  const int host = ::open(name_of_this_test().c_str(), O_RDWR | O_NOCTTY);
+  REQUIRE(host >= 0);
+  CHECK(device.state() == hal::LinkState::open);
+  const std::array<std::byte, 2> sent = {std::byte{13}, std::byte{10}};
+  CHECK(device.write(sent) == 2);
+  std::array<std::byte, 8> got{};
+  CHECK(::read(host, got.data(), got.size()) == 2);  // both as they were: the line edits nothing
+  CHECK(got[0] == std::byte{13});
+  ::close(host);
+  CHECK(device.state() == hal::LinkState::lost);
+  device.open();
+  CHECK(device.state() == hal::LinkState::opening);
+}
+
 TEST_CASE("the terminal's name is taken away with it, and a file in its place is left alone") {
   const std::string name = name_of_this_test();
   {
