@@ -53,7 +53,7 @@ struct CellConfig {
   RobotConfig robot;
   PlateConfig plate;
   tasks::ShotPlace start;
-  double tracking_overlap_mm = 15;
+  double tracking_overlap_mm = 45;
   double tracking_crossing_deg = 45;
   double seek_step_mm = 70;
   double seek_limit_mm = 3000;

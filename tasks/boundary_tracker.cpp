@@ -61,6 +61,7 @@ void BoundaryTracker::begin(const ShotPlace& start) {
 
 BoundaryTracker::Step BoundaryTracker::take(const Seen& seen) {
   ++counts_.shots;
+  if (seen.plate_found) plate_z_mm_ = seen.plate_z_mm;
   Piece piece;
   Step step;
   step.event = observe(seen, piece);
@@ -158,9 +159,11 @@ ShotPlace BoundaryTracker::carry_out(TrackAction action, const Piece& piece) {
   switch (action) {
     case TrackAction::step_along_x:
       ++counts_.seek_steps;
-      next.centre.x() += settings_.seek_step_mm;
-      next.centre.z() = hint_.z();
+      // The plate filled this field, so it is certain just inside the field's far border; beyond it may end.
+      next.centre.z() = plate_z_mm_;
       hint_ = next.centre;
+      hint_.x() += std::min(settings_.field_half_x_mm, settings_.field_half_y_mm) - hint_inside_mm;
+      next.centre.x() += settings_.seek_step_mm;
       return next;
     case TrackAction::centre_on_edge:
       heading_ = piece.tangent_first;

@@ -83,6 +83,7 @@ class BoundaryTracker {
   struct Seen {
     geometry::RigidMotion world_from_scanner;
     bool plate_found = false;
+    double plate_z_mm = 0;                // mean height of the plate in this shot, world
     geometry::BoundaryViewer::View view;  // scanner coordinates
   };
   struct Step {
@@ -128,6 +129,7 @@ class BoundaryTracker {
   ShotPlace place_;             // of the shot that take() is about to look at
   Eigen::Vector3d front_{0, 0, 0}, hint_{0, 0, 0};
   Eigen::Vector2d heading_{1, 0}, anchor_{0, 0};
+  double plate_z_mm_ = 0;
   double turned_ = 0;           // rad, of the heading since the outline began
   std::vector<Eigen::Vector2d> edges_, corners_;
 };

@@ -137,8 +137,8 @@ class Cell final : public Task {
   void measure();
   void advance_phase();
   void use_shot(const Order&, const hal::Frame&);
-  bool learn_heights(const geometry::RigidMotion& world_from_scanner);
-  void use_boundary_shot(const Order&, const geometry::RigidMotion& world_from_scanner, bool found);
+  std::optional<double> learn_heights(const geometry::RigidMotion& world_from_scanner);
+  void use_boundary_shot(const Order&, const geometry::RigidMotion& world_from_scanner, std::optional<double> plate_z_mm);
   void plan_surface();
   void next_surface_shot();
 

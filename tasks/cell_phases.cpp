@@ -78,19 +78,19 @@ void Cell::use_shot(const Order& order, const hal::Frame& frame) {
   const Eigen::Vector3d hint = world_from_scanner.inverse() * hint_in_world(order);
   // Nobody knows a plate's height before it was seen; from then on the hint is good to a step's slope.
   const double reach = order.purpose == ShotPurpose::seek ? settings_.depth_mm : hint_reach_mm;
-  bool found = view_.look(frame, hint, reach);
+  const bool found = view_.look(frame, hint, reach);
   if (order.purpose == ShotPurpose::surface) {
     if (found) surface_.fold(view_, world_from_scanner);
     return;
   }
   boundary_places_.push_back(order.place);
-  found = found && learn_heights(world_from_scanner);
-  if (found) surface_.keep(view_, world_from_scanner);
-  use_boundary_shot(order, world_from_scanner, found);
+  const std::optional<double> height = found ? learn_heights(world_from_scanner) : std::nullopt;
+  if (height) surface_.keep(view_, world_from_scanner);
+  use_boundary_shot(order, world_from_scanner, height);
 }
 
-// Adds the shot's heights to the rough model. False when what was found lies on the table: it is the table.
-bool Cell::learn_heights(const geometry::RigidMotion& world_from_scanner) {
+// Adds the shot's heights to the rough model and gives their mean; nothing when what was found is the table.
+std::optional<double> Cell::learn_heights(const geometry::RigidMotion& world_from_scanner) {
   HeightModel learnt = heights_;
   double sum = 0;
   int count = 0;
@@ -104,9 +104,9 @@ bool Cell::learn_heights(const geometry::RigidMotion& world_from_scanner) {
       ++count;
     }
   }
-  const bool plate = count > 0 && sum / count > settings_.lowest_plate_z_mm;
-  if (plate) heights_ = learnt;
-  return plate;
+  if (count == 0 || sum / count < settings_.lowest_plate_z_mm) return std::nullopt;
+  heights_ = learnt;
+  return sum / count;
 }
 
 Eigen::Vector3d Cell::hint_in_world(const Order& order) const {
@@ -122,9 +122,11 @@ Eigen::Vector3d Cell::hint_in_world(const Order& order) const {
   return {p.x(), p.y(), heights_.at(p.x(), p.y())};
 }
 
-void Cell::use_boundary_shot(const Order& order, const geometry::RigidMotion& world_from_scanner, bool found) {
+void Cell::use_boundary_shot(const Order& order, const geometry::RigidMotion& world_from_scanner,
+                             std::optional<double> plate_z_mm) {
   const auto step = tracker_.take({.world_from_scanner = world_from_scanner,
-                                   .plate_found = found,
+                                   .plate_found = plate_z_mm.has_value(),
+                                   .plate_z_mm = plate_z_mm.value_or(0),
                                    .view = view_.boundary()});
   record("tracker", to_string(step.event), to_string(step.from), to_string(step.to),
          hal::Message::format("shot {}: {}", order.number, to_string(step.action)));
