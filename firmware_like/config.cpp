@@ -111,6 +111,7 @@ void read_rest(TomlSection& file, CellConfig& c) {
 
   TomlSection fit = file.section("fit");
   fit.number("finest_span_mm", c.finest_span_mm, 1, 500);
+  fit.number("tolerance_mm", c.fit_tolerance_mm, 0, 10);
   fit.finish();
 }
 

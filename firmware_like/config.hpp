@@ -59,7 +59,8 @@ struct CellConfig {
   double seek_limit_mm = 3000;
   double scan_overlap_mm = 10;
   double scan_margin_mm = 2;
-  double finest_span_mm = 10;  // of the surface's net
+  double finest_span_mm = 10;   // of the surface's net
+  double fit_tolerance_mm = 0.005;
 };
 
 CellConfig default_config();

@@ -96,6 +96,7 @@ tasks::SurfaceTaskSettings surface_settings(const CellConfig& c) {
   s.fit.max_spans_u = finest_spans(longer, c.finest_span_mm);
   s.fit.max_spans_v = finest_spans(shorter, c.finest_span_mm);
   s.fit.max_shots = static_cast<int>(s.max_boundary_shots + cell.max_surface_shots);
+  s.fit.tolerance_mm = c.fit_tolerance_mm;
   s.fit.shot_sigma_mm = c.robot.repeatability_z_mm;
   return s;
 }

@@ -204,9 +204,11 @@ void SurfaceFit::Work::start_level() {
 void SurfaceFit::Work::keep_if_best() {
   const NetResult& result = solver.result();
   point_sigma = result.point_sigma_mm;  // all nets are compared under the finest net's estimate
+  // Scores are mean squared errors of prediction, so their difference is the square of what the coarser net misses.
+  // Nets come from fine to coarse: each one within the tolerance of the best so far takes over from it.
   const double score = generalized_cross_validation(totals, result);
-  if (!(score < best_score)) return;
-  best_score = score, best = level;
+  if (!(score < best_score + settings.tolerance_mm * settings.tolerance_mm)) return;
+  best_score = std::min(best_score, score), best = level;
   Level& kept = levels[level];
   for (int i = 0; i < kept.net.control_u(); ++i) {
     for (int j = 0; j < kept.net.control_v(); ++j) {

@@ -28,6 +28,9 @@ struct SurfaceFitSettings {
   int max_spans_u = 32, max_spans_v = 32;  // finest net, powers of two, at least 4
   int max_shots = 64;
   double shot_sigma_mm = 0.013;  // 0: shots are taken as exact
+  // The coarsest net is taken that misses no more than this (rms) of what the best net explains. Errors of pose in the
+  // plane look like steps of height where the plate slopes; below a few micrometres a finer net follows those.
+  double tolerance_mm = 0.005;
   double noise_mm = 0;           // of a point of weight 1; 0: estimated from the finest net's residual
   double fairing = 1e-8;         // relative to the data: the ratio of the matrices' traces
 };
