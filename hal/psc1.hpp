@@ -75,7 +75,7 @@ struct StatusReply {
 struct ErrorReply {
   Status status = Status::ok;
   std::uint32_t shot_id = 0;  // 0 when the error belongs to no shot
-  FixedText<100> text;
+  FixedText<100> text{};
 };
 
 // How a FRAME's payload begins; the stripe table and the columns follow (PROTOCOLS.md, "FRAME").

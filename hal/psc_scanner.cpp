@@ -92,7 +92,7 @@ void PscScanner::cue(Cue what, Instant now) {
 void PscScanner::start(Instant now) { cue(Cue::start, now); }
 
 bool PscScanner::trigger(std::uint32_t shot_id, Instant now) {
-  if (phase_ != Phase::ready) return false;
+  if (phase_ != Phase::ready || shot_id == 0) return false;  // 0 stands for no shot on the wire
   shot_ = {.id = shot_id, .outstanding = true};
   cue(Cue::triggered, now);
   return true;

@@ -35,10 +35,10 @@ struct RobotEvent {
     lost,       // the link is gone or the robot is silent beyond the limit
   };
   Kind kind;
-  Pose pose;
+  Pose pose{};
   bool calibrated = false;
   int code = 0;
-  Message text;
+  Message text{};
 };
 
 class Robot {

@@ -83,11 +83,13 @@ class LineWriter {
   }
   // Three decimals through a whole number of thousandths: no locale, no heap, and never "-0.000".
   void decimal(double value) noexcept {
-    if (!(std::abs(value) * 1000 <= static_cast<double>(largest_thousandths))) {
+    // Compared as a double first: a number that no integer holds must not reach llround().
+    const std::int64_t thousandths =
+        std::abs(value) < 1e6 ? std::llround(value * 1000) : largest_thousandths + 1;
+    if (std::abs(thousandths) > largest_thousandths) {
       good_ = false;
       return;
     }
-    const std::int64_t thousandths = std::llround(value * 1000);
     const std::int64_t size = std::abs(thousandths);
     std::array<char, 24> digits;
     const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), size / 1000).ptr;

@@ -63,7 +63,7 @@ struct Reply {  // a robot line
   Pose pose{};              // DON, and the answer to POS
   bool has_pose = false;
   Verb answers = Verb::ack; // for 0000 lines: which question is answered (syn, png, sta, pos, stp)
-  Status status;            // STA
+  Status status{};          // STA
   std::uint32_t nonce = 0;  // SYN
   int code = 0;             // ERR, EVT
   Refusal refusal{};        // NAK

@@ -26,10 +26,10 @@ struct LinkBytes {
 
 struct EventRecord {
   Instant at{0};
-  FixedText<16> source;  // the machine or driver that speaks
-  FixedText<24> event;
-  FixedText<24> from, to;  // states, where the event is a transition
-  Message text;
+  FixedText<16> source{};  // the machine or driver that speaks
+  FixedText<24> event{};
+  FixedText<24> from{}, to{};  // states, where the event is a transition
+  Message text{};
 };
 
 enum class ShotPurpose : std::uint8_t { seek = 0, boundary = 1, surface = 2 };
@@ -41,7 +41,7 @@ struct ShotRecord {
   std::uint32_t shot_id = 0;
   ShotPurpose purpose{};
   std::uint16_t attempts = 1;  // 1: the first exposure was good
-  Pose commanded, reported;    // world_from_tip
+  Pose commanded{}, reported{};    // world_from_tip
   std::uint64_t payload_offset = 0;
   std::uint32_t payload_bytes = 0;
 };

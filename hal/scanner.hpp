@@ -29,7 +29,7 @@ struct ScannerEvent {
   enum class Kind { ready, exposed, frame, shot_failed, lost };
   Kind kind;
   std::uint32_t shot_id = 0;
-  Message text;  // for shot_failed and lost: what happened
+  Message text{};  // for shot_failed and lost: what happened
 };
 
 struct ScannerInfo {
@@ -48,7 +48,8 @@ class Scanner {
   virtual void receive(Instant now) = 0;     // reads a bounded number of bytes and works on them
   virtual void transmit(Instant now) = 0;    // time-outs, requests, heartbeats: bytes out
 
-  // Asks for one exposure. False unless state() is ready. Ids are chosen by the caller, each used for one exposure.
+  // Asks for one exposure. False unless state() is ready. Ids are chosen by the caller, not 0, each used for one
+  // exposure, also across restarts of the program: the scanner answers an id that it knows with the stored frame.
   virtual bool trigger(std::uint32_t shot_id, Instant now) = 0;
   virtual void forget_shot() = 0;  // the cell no longer wants the outstanding shot
 
