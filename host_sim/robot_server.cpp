@@ -32,15 +32,15 @@ void RobotServer::step(hal::Instant now) {
     if (link_.state() != hal::LinkState::opening) link_.open();
   }
   watch(now);
-  if (fate_ == Fate::under_way && now >= busy_until_) finish_work(now);
+  if (working_ && now >= busy_until_) finish_work(now);
   flush();
 }
 
 void RobotServer::power_cycle(hal::Instant now) {
   drive_.stop(now);
-  if (fate_ == Fate::under_way) busy_until_ = stands_at_ = drive_.stands_at();
+  if (working_) busy_until_ = stands_at_ = std::max(now, drive_.stands_at());
   fate_ = Fate::none;
-  synchronised_ = calibrated_ = calibrating_ = false;
+  synchronised_ = calibrated_ = calibrating_ = working_ = false;
   last_number_ = last_error_ = event_ = 0;
   line_used_ = out_used_ = 0;
 }
@@ -50,13 +50,17 @@ void RobotServer::press_emergency_stop(hal::Instant now) {
   raise(Event::emergency_stop, now);
 }
 
+void RobotServer::switch_power(bool on, hal::Instant now) {
+  if (power_ && !on) raise(Event::power_lost, now);
+  power_ = on;
+}
+
 void RobotServer::receive(hal::Instant now) {
   std::array<std::byte, 256> bytes;
   while (const std::size_t count = link_.read(bytes)) {
     for (std::size_t k = 0; k < count; ++k) {
       const char c = static_cast<char>(bytes[k]);
       if (c == '\n') {
-        last_line_ = now;
         if (line_too_long_) {
           refuse(0, Refusal::checksum);
         } else if (line_used_ > 0) {
@@ -79,6 +83,7 @@ void RobotServer::take_line(std::string_view line, hal::Instant now) {
   ++counters_.lines;
   const auto command = robot_line::parse_command(line);
   if (!command) return refuse(0, Refusal::checksum);
+  last_line_ = now;
   if (command->number == 0) return answer_question(*command, now);
   take_numbered(*command, now);
 }
@@ -87,19 +92,17 @@ void RobotServer::answer_question(const robot_line::Command& question, hal::Inst
   Reply reply;
   reply.answers = question.verb;
   switch (question.verb) {
-    case Verb::syn:
-      // A host that begins anew knows nothing of a motion still under way: it must not go on behind its back.
-      abort_work(now);
+    case Verb::syn:  // a motion under way goes on: the host sees it in STA, and ends it by STP
       fate_ = Fate::none;
       last_number_ = event_ = 0;
       executions_.fill(0);
-      synchronised_ = !emergency_stop_ && power_;
+      synchronised_ = true;
       reply.nonce = question.nonce;
       break;
     case Verb::sta:
       reply.status.power = power_ && !emergency_stop_;
       reply.status.emergency_stop = emergency_stop_;
-      reply.status.moving = drive_.moving(now) || (calibrating_ && now < busy_until_);
+      reply.status.moving = !stands(now);
       reply.status.mode =
           calibrated_ ? robot_line::Status::Mode::calibrated : robot_line::Status::Mode::automatic;
       reply.status.last_error = last_error_;
@@ -109,7 +112,7 @@ void RobotServer::answer_question(const robot_line::Command& question, hal::Inst
       reply.has_pose = true;
       break;
     case Verb::stp:
-      abort_work(now);
+      abort_work(Error::stopped, now);
       break;
     default:
       break;  // PNG says only that both are there
@@ -124,7 +127,7 @@ void RobotServer::take_numbered(const robot_line::Command& command, hal::Instant
     return send_fate();
   }
   const bool is_next = command.number == robot_line::next_number(last_number_);
-  if (!is_next || fate_ == Fate::under_way) return refuse(command.number, Refusal::sequence);
+  if (!is_next || !stands(now)) return refuse(command.number, Refusal::sequence);
   last_number_ = command.number;
   execute(command, now);
   send_fate();
@@ -137,9 +140,9 @@ void RobotServer::execute(const robot_line::Command& command, hal::Instant now) 
     last_refusal_ = why;
   };
   if (emergency_stop_ || !power_) return failed(Error::arm_off, "the arm has no power");
-  if (drive_.moving(now)) return failed(Error::stopped, "the arm is still braking");
   if (command.verb == Verb::cal) {
     ++counters_.calibrations;
+    if (calibrated_) return begin_work(now, now, now);
     calibrating_ = true;
     return begin_work(now, now + times_.calibration, now + times_.calibration);
   }
@@ -155,30 +158,31 @@ void RobotServer::execute(const robot_line::Command& command, hal::Instant now) 
 
 void RobotServer::begin_work(hal::Instant now, hal::Instant stands_at, hal::Instant until) {
   fate_ = Fate::under_way;
+  working_ = true;
+  abort_code_ = 0;
   busy_from_ = now;
   stands_at_ = stands_at;
   busy_until_ = until;
 }
 
 void RobotServer::finish_work(hal::Instant now) {
-  calibrated_ |= calibrating_;
+  working_ = false;
+  calibrated_ |= calibrating_ && abort_code_ == 0;
   calibrating_ = false;
-  fate_ = Fate::done;
-  fate_pose_ = drive_.reported_pose(now);
   ++commands_done_;
+  if (fate_ != Fate::under_way) return;  // SYN has forgotten it
+  fate_ = abort_code_ == 0 ? Fate::done : Fate::failed;
+  fate_pose_ = drive_.reported_pose(now);
+  if (abort_code_ != 0) fate_code_ = last_error_ = abort_code_;
   send_fate();
 }
 
-// Ends what is under way, where the brakes bring it to stand; its number is answered by ERR from now on.
-void RobotServer::abort_work(hal::Instant now) {
-  if (fate_ != Fate::under_way) return;
+// Brakes. The command's number is answered by ERR once the arm stands.
+void RobotServer::abort_work(Error error, hal::Instant now) {
+  if (!working_ || abort_code_ != 0) return;
   drive_.stop(now);
-  stands_at_ = busy_until_ = calibrating_ ? now : drive_.stands_at();
-  calibrating_ = false;
-  fate_ = Fate::failed;
-  fate_code_ = last_error_ = std::to_underlying(Error::stopped);
-  ++commands_done_;
-  send_fate();
+  abort_code_ = std::to_underlying(error);
+  stands_at_ = busy_until_ = std::max(now, drive_.stands_at());
 }
 
 void RobotServer::watch(hal::Instant now) {
@@ -191,7 +195,7 @@ void RobotServer::watch(hal::Instant now) {
 
 // Stops whatever is under way; numbered lines are refused until SYN.
 void RobotServer::raise(Event event, hal::Instant now) {
-  abort_work(now);
+  abort_work(event == Event::watchdog ? Error::stopped : Error::arm_off, now);
   synchronised_ = false;
   event_ = std::to_underlying(event);
   event_said_ = now - event_period;

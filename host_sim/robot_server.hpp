@@ -39,6 +39,7 @@ class RobotServer {
   void power_cycle(hal::Instant now);
   void press_emergency_stop(hal::Instant now);
   void release_emergency_stop() noexcept { emergency_stop_ = false; }
+  void switch_power(bool on, hal::Instant now);
 
   // The last command's work: the joints turn in [busy_from, stands_at), then they settle until busy_until.
   hal::Instant busy_from() const noexcept { return busy_from_; }
@@ -61,7 +62,8 @@ class RobotServer {
   void execute(const hal::robot_line::Command&, hal::Instant now);
   void begin_work(hal::Instant now, hal::Instant stands_at, hal::Instant until);
   void finish_work(hal::Instant now);
-  void abort_work(hal::Instant now);
+  void abort_work(hal::robot_line::Error, hal::Instant now);
+  bool stands(hal::Instant now) const noexcept { return !working_ && !drive_.moving(now); }
   void watch(hal::Instant now);
   void send_fate();
   void send(const hal::robot_line::Reply&);
@@ -79,7 +81,9 @@ class RobotServer {
   int last_error_ = 0;
   int last_number_ = 0;
   Fate fate_ = Fate::none;
+  bool working_ = false;  // a motion or a calibration is under way, also one whose number a SYN has forgotten
   bool calibrating_ = false;
+  int abort_code_ = 0;   // of the work that the brakes are ending; 0: it ends by itself
   int fate_code_ = 0;    // of a command that failed
   hal::Pose fate_pose_;  // of one that is done
   hal::Instant busy_from_{-1}, stands_at_{-1}, busy_until_{-1}, last_line_{0};

@@ -48,7 +48,7 @@ void ScannerServer::power_cycle() {
 }
 
 void ScannerServer::forget_connection() {
-  connected_ = greeted_ = false;
+  connected_ = greeted_ = configured_ = false;
   config_ = {};
   raster_ = {};
   in_used_ = out_used_ = out_sent_ = 0;
@@ -115,6 +115,12 @@ std::size_t ScannerServer::take_message(std::span<const std::byte> bytes, hal::I
 }
 
 void ScannerServer::answer(const psc1::Header& header, std::span<const std::byte> payload, hal::Instant now) {
+  if (header.type != Type::hello && !greeted_) {
+    return refuse(header.request_id, Status::bad_state, 0, "HELLO comes first");
+  }
+  const bool has_payload =
+      header.type == Type::hello || header.type == Type::config || header.type == Type::trigger;
+  if (!has_payload && !payload.empty()) return drop();
   switch (header.type) {
     case Type::hello:
       return answer_hello(header, payload);
@@ -122,32 +128,37 @@ void ScannerServer::answer(const psc1::Header& header, std::span<const std::byte
       return answer_config(header, payload);
     case Type::trigger:
       return answer_trigger(header, payload, now);
+    case Type::reset:
+      return answer_reset(header, now);
     case Type::status:
-      return send(header.request_id, psc1::StatusReply{Status::ok, session_id_, shot_id_, 31.5f});
+      return send(header.request_id,
+                  psc1::StatusReply{Status::ok, session_id_, phase_ == Phase::stored ? shot_id_ : 0, 31.5f});
     case Type::ping:
-    case Type::reset: {
-      if (header.type == Type::reset) {
-        phase_ = Phase::no_shot;
-        shot_id_ = 0;
-        owes_exposed_ = owes_frame_ = false;
-        busy_until_ = std::min(busy_until_, now);
-      }
-      out_used_ += psc1::encode_empty(header.request_id, header.type, std::span{out_}.subspan(out_used_));
+      out_used_ += psc1::encode_empty(header.request_id, Type::ping, std::span{out_}.subspan(out_used_));
       return;
-    }
     default:
-      return refuse(header.request_id, Status::unsupported, 0, "the sensor does not answer this type");
+      return refuse(header.request_id, Status::unsupported, 0, "no host sends this type");
   }
+}
+
+void ScannerServer::answer_reset(const psc1::Header& header, hal::Instant now) {
+  phase_ = Phase::no_shot;
+  shot_id_ = 0;
+  owes_exposed_ = owes_frame_ = configured_ = false;
+  config_ = {};
+  raster_ = {};
+  busy_until_ = std::min(busy_until_, now);
+  out_used_ += psc1::encode_empty(header.request_id, Type::reset, std::span{out_}.subspan(out_used_));
 }
 
 void ScannerServer::answer_hello(const psc1::Header& header, std::span<const std::byte> payload) {
   const auto asked = psc1::decode_hello_request(payload);
-  if (!asked) return refuse(header.request_id, Status::bad_argument, 0, psc1::to_string(asked.error()));
-  if (asked->version_min > psc1::protocol_version || asked->version_max < psc1::protocol_version) {
-    return refuse(header.request_id, Status::unsupported, 0, "the sensor speaks version 1 only");
-  }
+  if (!asked) return wrong_payload(header, asked.error());
   const auto& s = optics_.settings();
   psc1::HelloReply reply;
+  const bool fits =
+      asked->version_min <= psc1::protocol_version && asked->version_max >= psc1::protocol_version;
+  if (!fits) reply.status = Status::unsupported;
   reply.session_id = session_id_;
   reply.max_stripes = static_cast<std::uint16_t>(s.stripes);
   reply.max_points_per_stripe = static_cast<std::uint16_t>(s.points_per_stripe);
@@ -157,18 +168,18 @@ void ScannerServer::answer_hello(const psc1::Header& header, std::span<const std
   reply.exposure_us = static_cast<std::uint32_t>(times_.exposure / std::chrono::microseconds{1});
   reply.processing_us = static_cast<std::uint32_t>(times_.processing / std::chrono::microseconds{1});
   sensor_name.copy(reply.sensor.data(), reply.sensor.size());
-  greeted_ = true;
+  greeted_ = fits;
   send(header.request_id, reply);
 }
 
 void ScannerServer::answer_config(const psc1::Header& header, std::span<const std::byte> payload) {
   const auto asked = psc1::decode_config(payload);
-  if (!greeted_) return refuse(header.request_id, Status::bad_state, 0, "HELLO comes first");
-  if (!asked) return refuse(header.request_id, Status::bad_argument, 0, psc1::to_string(asked.error()));
+  if (!asked) return wrong_payload(header, asked.error());
   const auto& s = optics_.settings();
   raster_ = {every(s.stripes, asked->stripes), every(s.points_per_stripe, asked->points_per_stripe)};
   config_ = *asked;
   config_.status = Status::ok;
+  configured_ = true;
   config_.stripes = static_cast<std::uint16_t>((s.stripes + raster_.every_stripe - 1) / raster_.every_stripe);
   config_.points_per_stripe =
       static_cast<std::uint16_t>((s.points_per_stripe + raster_.every_point - 1) / raster_.every_point);
@@ -178,15 +189,15 @@ void ScannerServer::answer_config(const psc1::Header& header, std::span<const st
 void ScannerServer::answer_trigger(const psc1::Header& header, std::span<const std::byte> payload,
                                    hal::Instant now) {
   const auto asked = psc1::decode_trigger(payload);
-  if (!asked) return refuse(header.request_id, Status::bad_argument, 0, psc1::to_string(asked.error()));
+  if (!asked) return wrong_payload(header, asked.error());
   const std::uint32_t id = asked->shot_id;
-  if (!greeted_) return refuse(header.request_id, Status::bad_state, id, "HELLO comes first");
+  if (!configured_) return refuse(header.request_id, Status::bad_state, id, "CONFIG comes first");
   if (id == 0) return refuse(header.request_id, Status::bad_argument, id, "shot id 0 belongs to no shot");
   const bool busy = phase_ == Phase::exposing || phase_ == Phase::computing;
   if (id == shot_id_ && phase_ != Phase::no_shot) {
     ++counters_.repeats;
     request_id_ = header.request_id;
-    repeated_ = phase_ != Phase::exposing;
+    repeated_ = true;
     owes_exposed_ = owes_frame_ = true;
     return;
   }
@@ -209,7 +220,7 @@ void ScannerServer::work(hal::Instant now) {
     const hal::Instant middle = busy_from_ + times_.exposure / 2;
     const auto world_from_scanner = scene_.world_from_scanner(middle);
     if (owes_exposed_ && connected_) {
-      send_exposed(repeated_);
+      send_exposed();
       flush();
     }
     Random random(seed_, Stream::optics, counters_.exposures);
@@ -220,13 +231,13 @@ void ScannerServer::work(hal::Instant now) {
   }
   if (phase_ == Phase::computing && now >= busy_until_) phase_ = Phase::stored;
   if (!connected_ || phase_ == Phase::no_shot || phase_ == Phase::exposing) return;
-  if (owes_exposed_) send_exposed(repeated_);
+  if (owes_exposed_) send_exposed();
   if (owes_frame_ && phase_ == Phase::stored) send_frame();
 }
 
-void ScannerServer::send_exposed(bool repeated) {
+void ScannerServer::send_exposed() {
   owes_exposed_ = false;
-  const psc1::Exposed reply{shot_id_, session_id_, repeated};
+  const psc1::Exposed reply{shot_id_, session_id_, repeated_};
   const auto acquired = static_cast<std::uint64_t>((busy_from_ + times_.exposure / 2).count());
   out_used_ += psc1::encode(request_id_, reply, acquired, std::span{out_}.subspan(out_used_));
 }
@@ -246,6 +257,13 @@ void ScannerServer::refuse(std::uint32_t request_id, Status status, std::uint32_
                            std::string_view text) {
   ++counters_.errors_sent;
   send(request_id, psc1::ErrorReply{status, shot_id, text});
+}
+
+// A payload of the wrong size breaks the stream's rules and ends the connection; a value of the wrong kind is
+// answered.
+void ScannerServer::wrong_payload(const psc1::Header& header, psc1::Flaw flaw) {
+  if (flaw == psc1::Flaw::payload_size) return drop();
+  refuse(header.request_id, Status::bad_argument, 0, psc1::to_string(flaw));
 }
 
 template <typename Reply>

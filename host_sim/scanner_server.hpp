@@ -64,7 +64,9 @@ class ScannerServer {
   void answer_config(const hal::psc1::Header&, std::span<const std::byte> payload);
   void answer_trigger(const hal::psc1::Header&, std::span<const std::byte> payload, hal::Instant now);
   void work(hal::Instant now);
-  void send_exposed(bool repeated);
+  void answer_reset(const hal::psc1::Header&, hal::Instant now);
+  void send_exposed();
+  void wrong_payload(const hal::psc1::Header&, hal::psc1::Flaw);
   void send_frame();
   void refuse(std::uint32_t request_id, hal::psc1::Status, std::uint32_t shot_id, std::string_view text);
   template <typename Reply>
@@ -81,7 +83,7 @@ class ScannerServer {
   std::uint32_t session_id_ = 0;
   ScannerCounters counters_;
 
-  bool connected_ = false, greeted_ = false;
+  bool connected_ = false, greeted_ = false, configured_ = false;
   hal::psc1::Config config_;
   Raster raster_;
   std::vector<std::byte> in_, out_;

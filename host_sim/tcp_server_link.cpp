@@ -10,6 +10,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 namespace moldloft::host_sim {
 
@@ -40,6 +41,7 @@ std::expected<std::unique_ptr<TcpServerLink>, SimError> TcpServerLink::listen_on
 
 TcpServerLink::~TcpServerLink() {
   close();
+  if (next_client_ >= 0) ::close(next_client_);
   ::close(listener_);
 }
 
@@ -68,17 +70,24 @@ std::size_t TcpServerLink::write(std::span<const std::byte> in) noexcept {
 
 LinkState TcpServerLink::state() noexcept {
   if (state_ == LinkState::opening) {
-    client_ = ::accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    client_ = next_client_ >= 0 ? std::exchange(next_client_, -1) : accept_one();
     if (client_ < 0) return state_;
-    const int yes = 1;
-    ::setsockopt(client_, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
     state_ = LinkState::open;
     why_ = "";
   } else if (state_ == LinkState::open) {
     char next = 0;
     moved(::recv(client_, &next, 1, MSG_PEEK | MSG_DONTWAIT), true);
+    if (state_ == LinkState::open) next_client_ = accept_one();
+    if (next_client_ >= 0) lose("another client has taken its place");
   }
   return state_;
+}
+
+int TcpServerLink::accept_one() noexcept {
+  const int client = ::accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  const int yes = 1;
+  if (client >= 0) ::setsockopt(client, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+  return client;
 }
 
 std::size_t TcpServerLink::moved(std::ptrdiff_t result, bool reading) noexcept {

@@ -1,4 +1,5 @@
-// A byte link over TCP from the server's side: one client at a time on a loopback port.
+// A byte link over TCP from the server's side: one client at a time on a loopback port; a new
+// client replaces the one before.
 //
 // open() listens; the state is `opening` until a client has connected, `open` while it is there, `lost` when
 // it has gone; open() again waits for the next one.
@@ -36,11 +37,13 @@ class TcpServerLink final : public hal::ByteLink {
 
  private:
   TcpServerLink(int listener, std::uint16_t port) : listener_(listener), port_(port) {}
+  int accept_one() noexcept;
   void lose(std::string_view why) noexcept;
   std::size_t moved(std::ptrdiff_t result, bool reading) noexcept;
 
   int listener_;
   int client_ = -1;
+  int next_client_ = -1;  // has connected while another was there
   std::uint16_t port_;
   hal::LinkState state_ = hal::LinkState::closed;
   std::string_view why_ = "not opened yet";

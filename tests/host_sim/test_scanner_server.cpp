@@ -175,6 +175,30 @@ TEST_CASE("a second shot while one is under way is refused, an unknown state too
   CHECK(psc1::decode_error(refused->payload)->status == psc1::Status::busy);
 }
 
+TEST_CASE("RESET forgets the stored shot and the configuration, and keeps the session") {
+  Bench bench;
+  bench.greet();
+  const auto session = bench.server.session_id();
+  bench.send(10u, psc1::Trigger{501});
+  bench.next();
+  bench.next();
+  bench.send_empty(11, psc1::Type::reset);
+  CHECK(bench.next()->header.type == psc1::Type::reset);
+  bench.send(12u, psc1::Trigger{501});
+  CHECK(psc1::decode_error(bench.next()->payload)->status == psc1::Status::bad_state);
+  bench.greet();
+  bench.send(13u, psc1::Trigger{501});
+  CHECK_FALSE(psc1::decode_exposed(bench.next()->payload)->repeated);
+  CHECK(bench.server.counters().exposures == 2);
+  CHECK(bench.server.session_id() == session);
+}
+
+TEST_CASE("a host of another version is told so in the scanner's own HELLO") {
+  Bench bench;
+  bench.send(1u, psc1::HelloRequest{2, 3});
+  CHECK(psc1::decode_hello_reply(bench.next()->payload)->status == psc1::Status::unsupported);
+}
+
 TEST_CASE("a broken header or payload ends the connection") {
   for (const std::size_t flipped : {std::size_t{3}, psc1::header_size + 1}) {
     CAPTURE(flipped);
@@ -192,6 +216,9 @@ TEST_CASE("a broken header or payload ends the connection") {
 
 TEST_CASE("PING and STATUS are answered, a power cycle begins a new session") {
   Bench bench;
+  bench.send_empty(4, psc1::Type::ping);
+  CHECK(psc1::decode_error(bench.next()->payload)->status == psc1::Status::bad_state);  // HELLO comes first
+  bench.greet();
   bench.send_empty(5, psc1::Type::ping);
   const auto pong = bench.next();
   CHECK(pong->header.type == psc1::Type::ping);

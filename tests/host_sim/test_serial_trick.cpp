@@ -140,4 +140,14 @@ TEST_CASE("a client on the scanner's port comes, goes and comes again") {
     CHECK(until([&] { return device.state() == hal::LinkState::lost; }));
     device.open();
   }
+  const auto first = hal::make_tcp_link("127.0.0.1", device.port());
+  first->open();
+  REQUIRE(until([&] { return device.state() == hal::LinkState::open; }));
+  const auto second = hal::make_tcp_link("127.0.0.1", device.port());
+  second->open();  // replaces the first
+  CHECK(until([&] { return device.state() == hal::LinkState::lost; }));
+  CHECK(until([&] { return first->state() == hal::LinkState::lost; }));
+  device.open();
+  CHECK(device.state() == hal::LinkState::open);
+  CHECK(second->state() == hal::LinkState::open);
 }
