@@ -322,6 +322,35 @@ TEST_CASE("the emergency stop is a fault at once; clearing it too early is the s
   CHECK(cell.peer.motions == 1);
 }
 
+TEST_CASE("a fault stays latched through a link that is lost and comes back") {
+  Cell cell;
+  cell.start();
+  cell.peer.press_emergency_stop();
+  REQUIRE(cell.run_until(Kind::fault));
+  cell.cable.cut();
+  cell.run(1s);
+  cell.peer.release_emergency_stop();
+  cell.cable.mend();
+  cell.run(10s);
+  CHECK(cell.robot.state() == RobotState::faulted);
+  CHECK(cell.peer.nonces.size() == 1);  // no SYN without an operator
+  cell.robot.reset(cell.clock.now());
+  REQUIRE(cell.run_until(Kind::ready));
+}
+
+TEST_CASE("an answer to an earlier SYN does not count") {
+  Cell cell;
+  cell.peer.mute = true;
+  cell.robot.start(cell.clock.now());
+  cell.run(50ms);
+  cell.peer.mute = false;
+  cell.peer.say({.answers = robot_line::Verb::syn, .nonce = 1});
+  cell.run(50ms);
+  CHECK(cell.robot.state() == RobotState::synchronising);
+  CHECK(cell.peer.times_heard("0000 STA") == 0);
+  REQUIRE(cell.run_until(Kind::ready, 1s));
+}
+
 TEST_CASE("an emergency stop whose message is lost shows in the next status") {
   Cell cell;
   cell.start();

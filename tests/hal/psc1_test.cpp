@@ -253,6 +253,28 @@ TEST_CASE(
   CHECK(x[2] == -32768);
 }
 
+TEST_CASE("a sentinel in one column alone makes the whole point missing, in the blocks as in the rest") {
+  const Frame frame = sample_frame(1, 40);
+  std::vector<std::byte> wire(encoded_frame_size(frame, Encoding::int16, false));
+  REQUIRE(encode_frame(8, frame, Encoding::int16, false, {51, 51, 40}, wire) == wire.size());
+  for (const std::size_t point : {3u, 15u, 16u, 39u}) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      CAPTURE(point);
+      CAPTURE(axis);
+      auto damaged = wire;
+      const std::int16_t missing = -32768;
+      std::memcpy(damaged.data() + header_size + 48 + 12 + 2 * (40 * axis + point), &missing, 2);
+      Frame back{1, 40};
+      REQUIRE(decode_frame(payload_of(damaged), back));
+      for (std::size_t i = 0; i < 40; ++i) {
+        CHECK(std::isnan(back.x[i]) == (i == point));
+        CHECK(std::isnan(back.y[i]) == (i == point));
+        CHECK(std::isnan(back.z[i]) == (i == point));
+      }
+    }
+  }
+}
+
 TEST_CASE("a frame payload that contradicts itself is refused whole") {
   const Frame frame = sample_frame(3, 7);
   std::vector<std::byte> wire(encoded_frame_size(frame, Encoding::int16, true));

@@ -238,6 +238,7 @@ TEST_CASE("frames of another shot, of another session, or come twice are dropped
   cell.peer.send_frame(4, 1000);
   cell.peer.send_frame(5, 999);
   REQUIRE(cell.run_until(Kind::frame));
+  CHECK(cell.scanner.frame().session_id == 1000);
   const std::uint64_t offset = cell.scanner.frame_offset();
   cell.peer.send_frame(5, 1000);
   cell.run(1s);

@@ -170,7 +170,7 @@ TEST_CASE(
   const TemporaryFolder folder;
   RunStore store = new_store(folder);
   VirtualClock clock;
-  Cable cable{clock, {}};
+  Cable cable{clock, {.bytes_per_second = 0.5e6}};  // slow enough for a frame to come in pieces
   Recorder recorder{{}};
   TappedLink link{cable.host(), scanner, recorder, clock};
   ScannerPeer peer{cable.device(), clock};

@@ -127,6 +127,7 @@ TEST_CASE("any stretch of a link's bytes is put together from the pieces; a hole
   }
   CHECK(store.bytes(LinkId::scanner, Direction::received, 800, 200));
   CHECK_FALSE(store.bytes(LinkId::scanner, Direction::received, 699, 2));
+  CHECK_FALSE(store.bytes(LinkId::scanner, Direction::received, 699, 150));
   CHECK_FALSE(store.bytes(LinkId::scanner, Direction::received, 750, 60));
   CHECK_FALSE(store.bytes(LinkId::scanner, Direction::received, 900, 101));
   CHECK_FALSE(store.bytes(LinkId::scanner, Direction::sent, 0, 1));
