@@ -61,7 +61,7 @@ TEST_CASE("equation (5.1) of the thesis is a turn about joint 4 of a scanner hel
   CHECK((world_from_tip * tip_from_scanner * p - thesis).norm() < 1e-12);
 }
 
-TEST_CASE("wrapped angles lie in (-pi, pi]") {
+TEST_CASE("wrapped angles lie above -pi and up to pi") {
   CHECK(wrapped_angle(pi) == pi);
   CHECK(wrapped_angle(-pi) == pi);
   CHECK(wrapped_angle(3 * pi) == doctest::Approx(pi));
