@@ -59,7 +59,7 @@ void without_heap(F&& work) {
 
 TEST_CASE("the counter counts") {
   allocations = 0;
-  without_heap([] { delete new int{1}; });
+  without_heap([] { operator delete(operator new(8)); });
   CHECK(allocations == 1);
 }
 
