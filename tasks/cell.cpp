@@ -264,7 +264,7 @@ void Cell::publish() {
     p.part_done = surface_.progress();
     p.time_left = Duration{0};
   }
-  published_.store(p);
+  published_.set(p);
 }
 
 void Cell::record(std::string_view source, std::string_view event, std::string_view from, std::string_view to,

@@ -15,12 +15,12 @@
 #include <span>
 #include <vector>
 
+#include "hal/latest_value.hpp"
 #include "hal/recorder.hpp"
 #include "hal/robot.hpp"
 #include "hal/scanner.hpp"
 #include "tasks/boundary_tracker.hpp"
 #include "tasks/cell_state.hpp"
-#include "tasks/latest.hpp"
 #include "tasks/motion_guard.hpp"
 #include "tasks/scan_plan.hpp"
 #include "tasks/scheduler.hpp"
@@ -73,7 +73,7 @@ class Cell final : public Task {
   void run(Instant now) override;
 
   void command(CellEvent);  // an operator's or line controller's command, taken up in the next tick
-  CellProgress progress() const { return published_.load(); }
+  CellProgress progress() const { return published_.get(); }
   CellState state() const { return state_; }
   Phase phase() const { return phase_; }
   HoldCause cause() const { return cause_; }
@@ -176,7 +176,7 @@ class Cell final : public Task {
   std::uint64_t points_seen_ = 0;
   CycleTimes cycle_;
   Histogram frame_to_command_;
-  Latest<CellProgress> published_;
+  hal::LatestValue<CellProgress> published_;
 };
 
 }  // namespace moldloft::tasks
