@@ -79,7 +79,9 @@ bool Controller::at_rest() const {
 }
 
 void Controller::watch_health(hal::Instant) {
-  if (scheduler_.misses_in_a_row() > max_misses_in_a_row) cell_.command(tasks::CellEvent::abort);
+  if (scheduler_.misses_in_a_row() <= max_misses_in_a_row) return;
+  cell_.abort(hal::Message::format("{} ticks missed in a row: the machine is too slow or too busy for [cell] tick_us",
+                                   scheduler_.misses_in_a_row()));
 }
 
 MemoryPlan Controller::memory() const {

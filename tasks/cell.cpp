@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
+#include <numbers>
 
 #include "tasks/tool_pose.hpp"
 
@@ -41,6 +43,8 @@ void Cell::run(Instant now) {
     const auto event = static_cast<CellEvent>(first);
     if (event == CellEvent::hold) {
       hold(HoldCause::person, "held by command: send unhold to go on");
+    } else if (event == CellEvent::abort) {
+      abort("aborted by command: clear when the cell is safe");
     } else {
       apply(event);
     }
@@ -181,6 +185,7 @@ void Cell::advance_state() {
     case CellState::starting:
       if (!settings_.devices) return apply(CellEvent::done);
       if (start_step_ == StartStep::devices && devices_ready()) {
+        if (const auto no = refuse_scanner()) return abort(*no);
         start_step_ = StartStep::calibrating;
         if (!calibrated_) robot_.calibrate(now_);
       }
@@ -227,6 +232,16 @@ void Cell::start_devices() {
   devices_started_ = true;
   scanner_.start(now_);
   robot_.start(now_);
+}
+
+// The memory plan, the tracker's steps and the zig-zag are made for the configured field of view.
+std::optional<hal::Message> Cell::refuse_scanner() const {
+  constexpr double tolerance = 0.01;
+  const auto& info = scanner_.info();
+  const double x = 2 * settings_.tracker.field_half_x_mm, y = 2 * settings_.tracker.field_half_y_mm;
+  if (std::abs(info.field_x_mm - x) <= tolerance * x && std::abs(info.field_y_mm - y) <= tolerance * y) return std::nullopt;
+  return hal::Message::format("scanner reports a field of {:.1f} x {:.1f} mm: correct [scanner] field_mm = [{:.1f}, {:.1f}]",
+                              info.field_x_mm, info.field_y_mm, x, y);
 }
 
 bool Cell::devices_ready() const {

@@ -72,7 +72,8 @@ class Cell final : public Task {
 
   void run(Instant now) override;
 
-  void command(CellEvent);  // an operator's or line controller's command, taken up in the next tick
+  void abort(const hal::Message& why);  // on the control thread: what is dangerous, whoever sees it
+  void command(CellEvent);              // an operator's or line controller's command, taken up in the next tick
   CellProgress progress() const { return published_.get(); }
   CellState state() const { return state_; }
   Phase phase() const { return phase_; }
@@ -107,11 +108,11 @@ class Cell final : public Task {
   void apply(CellEvent, const hal::Message& text = {});
   void enter(CellAction);
   void hold(HoldCause, const hal::Message&);
-  void abort(const hal::Message&);
   void on_robot(const hal::RobotEvent&);
   void on_scanner(const hal::ScannerEvent&);
   void advance_state();
   void start_devices();
+  std::optional<hal::Message> refuse_scanner() const;
   bool devices_ready() const;
   void account();
   void publish();

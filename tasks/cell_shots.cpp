@@ -103,7 +103,11 @@ bool Cell::pick_pose(Order& order) {
 }
 
 void Cell::trigger() {
-  if (++arm_.attempts > 1) ++retaken_;
+  if (++arm_.attempts > 1) {
+    // Given up under its old id, which may be exposed already; the arm has not moved, so a new exposure is as good.
+    ++retaken_;
+    arm_.shot_id = (++epoch_ << shot_number_bits) | arm_.number;
+  }
   scanner_.trigger(arm_.shot_id, now_);
 }
 
