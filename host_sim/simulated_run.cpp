@@ -103,6 +103,7 @@ std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& option
 
   const firmware_like::RunLabel label{.plate = plate->plate->name(), .seed = options.cell.seed};
   SimulatedRun run{.summary = summary_of(*controller, label), .exit_code = firmware_like::exit_code(*controller)};
+  if (controller->recorder().store_failed()) return std::unexpected{SimError{std::string{controller->recorder().store_error().view()}}};
   if (!options.resume && !controller->cell().has_driven()) {
     firmware_like::discard_run(std::move(*folder));
     return run;

@@ -18,12 +18,12 @@
 namespace moldloft::host_sim {
 
 // What a scripted run may lay its hands on between two ticks: the devices behind their cables, the cables themselves, and
-// the controller, to look at.
+// the controller, to look at or to command.
 struct SimulatedCell {
   SimulatedWorld& world;
   hal::Cable& scanner_cable;
   hal::Cable& robot_cable;
-  const firmware_like::Controller& controller;
+  firmware_like::Controller& controller;
   hal::RunStore& store;
 };
 

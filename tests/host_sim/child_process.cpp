@@ -13,7 +13,7 @@ namespace moldloft::host_sim {
 
 using namespace std::chrono_literals;
 
-ChildProcess::ChildProcess(const std::vector<std::string>& words, const std::string& preload, const std::string& folder) {
+ChildProcess::ChildProcess(const std::vector<std::string>& words, const std::string& preload) {
   const std::string out = folder_.file("out"), err = folder_.file("err");
   std::vector<char*> arguments;
   for (const auto& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
@@ -21,7 +21,6 @@ ChildProcess::ChildProcess(const std::vector<std::string>& words, const std::str
   pid_ = ::fork();
   if (pid_ != 0) return;
   if (!preload.empty()) ::setenv("LD_PRELOAD", preload.c_str(), 1);
-  if (!folder.empty() && ::chdir(folder.c_str()) != 0) ::_exit(126);
   ::dup2(::open("/dev/null", O_RDONLY), 0);
   ::dup2(::open(out.c_str(), O_CREAT | O_WRONLY | O_APPEND, 0600), 1);
   ::dup2(::open(err.c_str(), O_CREAT | O_WRONLY | O_APPEND, 0600), 2);
@@ -65,9 +64,9 @@ bool ChildProcess::prints(std::string_view text, hal::Duration limit) {
 std::string ChildProcess::out() const { return text_of(folder_.file("out")); }
 std::string ChildProcess::err() const { return text_of(folder_.file("err")); }
 
-Finished run_program(const std::vector<std::string>& words, const std::string& folder) {
-  ChildProcess child{words, {}, folder};
-  const auto code = child.wait(30s);
+Finished run_program(const std::vector<std::string>& words, hal::Duration limit) {
+  ChildProcess child{words};
+  const auto code = child.wait(limit);
   return {code, child.out(), child.err()};
 }
 

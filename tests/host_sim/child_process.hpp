@@ -13,10 +13,15 @@
 
 namespace moldloft::host_sim {
 
+struct Finished {
+  std::optional<int> exit_code;
+  std::string out, err;
+};
+
 class ChildProcess {
  public:
   // `words`: the program's path and its arguments. `preload`: a library for LD_PRELOAD, or nothing.
-  explicit ChildProcess(const std::vector<std::string>& words, const std::string& preload = {}, const std::string& folder = {});
+  explicit ChildProcess(const std::vector<std::string>& words, const std::string& preload = {});
   ~ChildProcess();
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
@@ -37,13 +42,8 @@ class ChildProcess {
   bool ended_ = false;
 };
 
-struct Finished {
-  std::optional<int> exit_code;
-  std::string out, err;
-};
-
-// Runs a program to its end, which must come within 30 s. `folder`: where it runs.
-Finished run_program(const std::vector<std::string>& words, const std::string& folder = {});
+// Runs a program to its end.
+Finished run_program(const std::vector<std::string>& words, hal::Duration limit = std::chrono::seconds{30});
 
 std::string text_of(const std::string& path);
 int lines_in(std::string_view text);
