@@ -48,7 +48,13 @@ struct CellSettings {
   bool devices = true;               // false: only archived shots, nothing moves
 };
 
-enum class HoldCause : std::uint8_t { none, scanner, recorder, person };
+enum class HoldCause : std::uint8_t {
+  none,
+  scanner,      // ends by itself when the scanner is back
+  recorder,     // ends by itself when the disk takes records again
+  person,       // something must be seen to; the run can be resumed then
+  measurement,  // what was measured, planned or configured leads here each time: resuming would only repeat it
+};
 
 struct CellProgress {  // for people; trivially copyable
   CellState state = CellState::idle;
@@ -72,13 +78,14 @@ class Cell final : public Task {
 
   void run(Instant now) override;
 
-  void abort(const hal::Message& why);  // on the control thread: what is dangerous, whoever sees it
-  void command(CellEvent);              // an operator's or line controller's command, taken up in the next tick
+  void command(CellEvent);  // an operator's or line controller's command, taken up in the next tick
+  void abort(const hal::Message& why, HoldCause = HoldCause::person);  // on the control thread: what is dangerous
   CellProgress progress() const { return published_.get(); }
   CellState state() const { return state_; }
   Phase phase() const { return phase_; }
   HoldCause cause() const { return cause_; }
   const hal::Message& why() const { return why_; }
+  bool has_driven() const { return has_driven_; }  // the arm was sent to at least one shot
 
   // ---- results, for reading when the cell has come to rest
   const BoundaryTracker& tracker() const { return tracker_; }
@@ -113,6 +120,7 @@ class Cell final : public Task {
   void advance_state();
   void start_devices();
   std::optional<hal::Message> refuse_scanner() const;
+  bool scanner_ready() const;
   bool devices_ready() const;
   void account();
   void publish();
@@ -130,6 +138,7 @@ class Cell final : public Task {
   void deliver();
   void give_up(const hal::Message&);
   bool deliver_archived();
+  void skip_given_up();
   bool may_expose() const;
   Eigen::Vector3d hint_in_world(const Order&) const;
 
@@ -159,7 +168,7 @@ class Cell final : public Task {
   hal::Message why_;
   StartStep start_step_ = StartStep::devices;
   bool devices_started_ = false, calibrated_ = false;
-  bool counting_ = false;
+  bool counting_ = false, has_driven_ = false;
 
   ShotState shot_state_ = ShotState::parked;
   std::optional<Order> wanted_;
