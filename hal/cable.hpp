@@ -25,8 +25,8 @@ class Cable {
   ~Cable();
 
   ByteLink& host() noexcept;    // the controller's end; open() succeeds at once while the cable is whole
-  // The device's end; open while the host's end is open. After the host has opened anew it is `lost` for one look:
-  // that is how a server learns of the new connection.
+  // The device's end; open while the host's end is open. After the host has opened anew it is `lost` for one
+  // look: that is how a server learns of the new connection.
   ByteLink& device() noexcept;
   void cut() noexcept;
   void mend() noexcept;

@@ -45,49 +45,62 @@ std::array<T, count> load(const std::byte* at) noexcept {
   return values;
 }
 
-struct Target {
-  float *x, *y, *z;
+template <std::size_t count>
+struct Points {
+  std::array<float, count> x, y, z;
+
+  void store(Frame& frame, std::size_t first) const noexcept {
+    std::memcpy(frame.x.data() + first, x.data(), sizeof x);
+    std::memcpy(frame.y.data() + first, y.data(), sizeof y);
+    std::memcpy(frame.z.data() + first, z.data(), sizeof z);
+  }
 };
 
-// Points first .. first + count - 1. A point that misses one coordinate misses all: half a point is none.
+// Points first .. first + count - 1. A point that misses one coordinate misses all: half a point is none. The
+// results go through locals: stores through three pointers that might overlap would keep the compiler from
+// vector code.
 template <std::size_t count>
 void decode_points(const Columns<std::int16_t>& from, std::size_t first, const FrameHead& head,
-                   Target to) noexcept {
+                   Frame& frame) noexcept {
   const auto x = load<std::int16_t, count>(from.x + first * 2);
   const auto y = load<std::int16_t, count>(from.y + first * 2);
   const auto z = load<std::int16_t, count>(from.z + first * 2);
   const auto [scale_x, scale_y, scale_z] = head.scale;
   const auto [offset_x, offset_y, offset_z] = head.offset;
+  Points<count> points;
   for (std::size_t i = 0; i < count; ++i) {
-    const float hole = (x[i] == missing) | (y[i] == missing) | (z[i] == missing) ? nan : 0.0f;
-    to.x[first + i] = hole + (offset_x + scale_x * static_cast<float>(x[i]));
-    to.y[first + i] = hole + (offset_y + scale_y * static_cast<float>(y[i]));
-    to.z[first + i] = hole + (offset_z + scale_z * static_cast<float>(z[i]));
+    const bool is_hole = (x[i] == missing) | (y[i] == missing) | (z[i] == missing);
+    const float hole = is_hole ? nan : 0.0f;
+    points.x[i] = hole + (offset_x + scale_x * static_cast<float>(x[i]));
+    points.y[i] = hole + (offset_y + scale_y * static_cast<float>(y[i]));
+    points.z[i] = hole + (offset_z + scale_z * static_cast<float>(z[i]));
   }
+  points.store(frame, first);
 }
 
 template <std::size_t count>
-void decode_points(const Columns<float>& from, std::size_t first, const FrameHead&, Target to) noexcept {
+void decode_points(const Columns<float>& from, std::size_t first, const FrameHead&, Frame& frame) noexcept {
   const auto x = load<float, count>(from.x + first * 4);
   const auto y = load<float, count>(from.y + first * 4);
   const auto z = load<float, count>(from.z + first * 4);
+  Points<count> points;
   for (std::size_t i = 0; i < count; ++i) {
     // 0 * v is 0 for a number and NaN for what is none (infinity or NaN).
     const float hole = 0.0f * x[i] + 0.0f * y[i] + 0.0f * z[i];
-    to.x[first + i] = hole + x[i];
-    to.y[first + i] = hole + y[i];
-    to.z[first + i] = hole + z[i];
+    points.x[i] = hole + x[i];
+    points.y[i] = hole + y[i];
+    points.z[i] = hole + z[i];
   }
+  points.store(frame, first);
 }
 
 template <typename T>
 void decode_columns(const std::byte* begin, const FrameHead& head, Frame& frame) noexcept {
   const std::size_t points = head.point_count;
   const Columns<T> from{begin, points};
-  const Target to{frame.x.data(), frame.y.data(), frame.z.data()};
   std::size_t i = 0;
-  for (; i + block <= points; i += block) decode_points<block>(from, i, head, to);
-  for (; i < points; ++i) decode_points<1>(from, i, head, to);
+  for (; i + block <= points; i += block) decode_points<block>(from, i, head, frame);
+  for (; i < points; ++i) decode_points<1>(from, i, head, frame);
 }
 
 // Stripes come in ascending index, their points in the columns in the same order and inside them.

@@ -55,8 +55,8 @@ enum class Event : int { emergency_stop = 1, power_lost = 2, watchdog = 3, motio
 // What ERR says where the controller has no number of its own for it.
 enum class Error : int { out_of_reach = 1, bad_value = 2, not_calibrated = 3, stopped = 4, arm_off = 5 };
 
-// An answer to a 0000 line has number 0, verb ack and the question in `answers`; on the wire it begins with the
-// question's own verb ("<0000 STA 1 0 0 2 0").
+// An answer to a 0000 line has number 0, verb ack and the question in `answers`; on the wire it begins with
+// the question's own verb ("<0000 STA 1 0 0 2 0").
 struct Reply {  // a robot line
   int number = 0;
   Verb verb = Verb::ack;

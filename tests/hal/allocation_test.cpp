@@ -59,7 +59,7 @@ void without_heap(F&& work) {
 
 TEST_CASE("the counter counts") {
   allocations = 0;
-  without_heap([] { delete new int{1}; });
+  without_heap([] { operator delete(operator new(8)); });
   CHECK(allocations == 1);
 }
 
@@ -129,7 +129,7 @@ TEST_CASE("both drivers, tapped and recorded, through shots, motions, damage and
 }
 
 TEST_CASE(
-    "a TCP link that is open reads, writes, looks and loses itself without the heap; so it does when it "
+    "a TCP link that is open reads, writes, looks and loses itself without the heap, so it does when it "
     "opens again") {
   LoopbackServer server;
   const auto link = make_tcp_link("127.0.0.1", server.port());

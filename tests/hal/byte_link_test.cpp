@@ -93,7 +93,7 @@ std::vector<std::byte> random_bytes(std::uint32_t seed, std::size_t count) {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("before open() nothing moves; close() may be called at any time", B, CableBench,
+TEST_CASE_TEMPLATE("before open() nothing moves, close() may be called at any time", B, CableBench,
                    TappedBench, TcpBench) {
   B bench;
   std::array<std::byte, 16> bytes{};
@@ -151,7 +151,7 @@ TEST_CASE_TEMPLATE("a far end that does not read stops the writer, without a wai
   }));
 }
 
-TEST_CASE_TEMPLATE("a far end that hangs up is noticed, and says so; opened again the link is as new", B,
+TEST_CASE_TEMPLATE("a far end that hangs up is noticed, and says so, opened again the link is as new", B,
                    CableBench, TappedBench, TcpBench) {
   B bench;
   REQUIRE(bench.open());

@@ -43,7 +43,7 @@ TEST_CASE("bytes arrive one byte time after another, the delay on top") {
   CHECK(arrived(cable.device()) == 0);
 }
 
-TEST_CASE("what is written while the line is busy queues up behind; after a pause the line starts afresh") {
+TEST_CASE("what is written while the line is busy queues up behind, after a pause the line starts afresh") {
   VirtualClock clock;
   Cable cable{clock, {.bytes_per_second = 1000}};
   cable.host().open();
@@ -109,7 +109,7 @@ TEST_CASE("a stalled reader does not break the cable, however many single writes
   CHECK(cable.host().write(counting(1)) == 1);
 }
 
-TEST_CASE("a cut loses what is on the way, on both sides; only a mended cable opens again") {
+TEST_CASE("a cut loses what is on the way, on both sides, only a mended cable opens again") {
   VirtualClock clock;
   Cable cable{clock, {.bytes_per_second = 1000}};
   CHECK(cable.device().state() == LinkState::closed);

@@ -284,7 +284,7 @@ TEST_CASE("the robot restarts before it has seen the line: not even then does it
   CHECK(cell.peer.motions == 0);
 }
 
-TEST_CASE("NAK SQ for our command is a fault; for an older one it is an echo") {
+TEST_CASE("NAK SQ for our command is a fault, for an older one it is an echo") {
   Cell cell;
   cell.start();
   cell.peer.motion_time = 2s;
@@ -303,7 +303,7 @@ TEST_CASE("NAK SQ for our command is a fault; for an older one it is an echo") {
   REQUIRE(cell.run_until(Kind::fault));
 }
 
-TEST_CASE("the emergency stop is a fault at once; clearing it too early is the same fault again") {
+TEST_CASE("the emergency stop is a fault at once, clearing it too early is the same fault again") {
   Cell cell;
   cell.start();
   cell.peer.motion_time = 10s;
@@ -362,7 +362,7 @@ TEST_CASE("an emergency stop whose message is lost shows in the next status") {
   REQUIRE(cell.run_until(Kind::fault, 1200ms));
 }
 
-TEST_CASE("STP goes out at once and again until it is answered; the stopped motion is no fault") {
+TEST_CASE("STP goes out at once and again until it is answered, the stopped motion is no fault") {
   Cell cell;
   cell.start();
   cell.peer.motion_time = 10s;

@@ -216,7 +216,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("a frame in float32 comes back exactly; a point with one coordinate missing is missing") {
+TEST_CASE("a frame in float32 comes back exactly, a point with one coordinate missing is missing") {
   Frame frame = sample_frame(2, 40);
   frame.z[9] = NAN;
   frame.y[77] = INFINITY;

@@ -85,7 +85,7 @@ auto drop_first(int times, psc1::Type type) {
 
 }  // namespace
 
-TEST_CASE("HELLO, CONFIG, ready; the sensor's figures are known then") {
+TEST_CASE("HELLO, CONFIG, ready, the sensor's figures are known then") {
   Cell cell;
   CHECK(cell.scanner.state() == ScannerState::offline);
   cell.start();
@@ -165,7 +165,7 @@ TEST_CASE("one receive() takes no more than its budget") {
   CHECK(ticks >= (32 + 48 + 120 + 3500 + 4) / 1000);
 }
 
-TEST_CASE("a frame with a wrong CRC drops the connection; the same shot comes again, exposed once") {
+TEST_CASE("a frame with a wrong CRC drops the connection, the same shot comes again, exposed once") {
   for (const std::size_t at :
        {0u, 9u, 25u, 40u, 200u, 3000u}) {  // magic, length, header CRC, head, table, columns
     CAPTURE(at);
@@ -262,7 +262,7 @@ TEST_CASE("a shot that the cell forgets leaves no trace") {
   CHECK(cell.count(Kind::shot_failed) == 0);
 }
 
-TEST_CASE("a heartbeat a second; a scanner that is silent for three is lost, and found again") {
+TEST_CASE("a heartbeat a second, a scanner that is silent for three is lost, and found again") {
   Cell cell;
   cell.start();
   cell.run(10s + 5ms);

@@ -60,7 +60,7 @@ TEST_CASE("a ring is full to its last byte, and says exactly how much room is le
   CHECK(ring.high_water() == 104);
 }
 
-TEST_CASE("parts become one record; an empty record is a record") {
+TEST_CASE("parts become one record, an empty record is a record") {
   RecordRing ring{100};
   const std::string head = "head";
   const std::string tail = "tail";

@@ -33,7 +33,7 @@ constexpr auto received = Direction::received;
 
 }  // namespace
 
-TEST_CASE("bytes, events and shots come into the store; offsets count each link and direction for itself") {
+TEST_CASE("bytes, events and shots come into the store, offsets count each link and direction for itself") {
   const TemporaryFolder folder;
   RunStore store = new_store(folder);
   Recorder recorder{{}};
@@ -56,7 +56,7 @@ TEST_CASE("bytes, events and shots come into the store; offsets count each link 
   CHECK(store.events()->size() == 1);
 }
 
-TEST_CASE("a full ring drops and counts; the offsets of what follows stay right") {
+TEST_CASE("a full ring drops and counts, the offsets of what follows stay right") {
   const TemporaryFolder folder;
   RunStore store = new_store(folder);
   Recorder recorder{{.bulk_bytes = 1000, .events_bytes = 4096, .largest_frame_bytes = 100}};
@@ -76,7 +76,7 @@ TEST_CASE("a full ring drops and counts; the offsets of what follows stay right"
 }
 
 TEST_CASE(
-    "there is room for a frame until there is not, and again after the drain; no byte of a frame is lost") {
+    "there is room for a frame until there is not, and again after the drain, no byte of a frame is lost") {
   const TemporaryFolder folder;
   RunStore store = new_store(folder);
   constexpr std::size_t frame = 100'000;

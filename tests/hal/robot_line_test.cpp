@@ -198,7 +198,7 @@ TEST_CASE("a line that is not one says why") {
         Flaw::fields);
 }
 
-TEST_CASE("random text never crashes the parsers; with a right checksum it still has to be a line") {
+TEST_CASE("random text never crashes the parsers, with a right checksum it still has to be a line") {
   std::mt19937 random{4};
   const std::string alphabet = "0123456789 -.MOVCALSYNPGTDERKQ*<>";
   for (int i = 0; i < 50'000; ++i) {

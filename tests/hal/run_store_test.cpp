@@ -106,7 +106,7 @@ TEST_CASE("what is written is read back, by another object, in order") {
   CHECK((*shots)[0].payload_offset == 32);
 }
 
-TEST_CASE("any stretch of a link's bytes is put together from the pieces; a hole is not papered over") {
+TEST_CASE("any stretch of a link's bytes is put together from the pieces, a hole is not papered over") {
   const TemporaryFolder folder;
   RunStore store = opened(folder.file("run.db"), Mode::create);
   const auto bytes = counting(1000);

@@ -70,7 +70,7 @@ TEST_CASE("opening is a state: an address that never answers keeps it without ho
   ::close(listener);
 }
 
-TEST_CASE("what the peer sent before it hung up is still read; then the link is lost with a reason") {
+TEST_CASE("what the peer sent before it hung up is still read, then the link is lost with a reason") {
   LoopbackServer server;
   const auto link = make_tcp_link("localhost", server.port());
   link->open();
