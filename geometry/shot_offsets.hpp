@@ -6,8 +6,8 @@
 // where column s of B holds the sums of the basis functions over the points of shot s (the right-hand side for z = 1),
 // D the number of points and h the sum of heights of every shot. The surface follows from L' c = y - W d.
 //
-// Memory       a shot's moments are kept only for the cells that it touches; when the plan is full, the shot at hand and
-//              those after it are taken as exact and counted
+// Memory       a shot's moments are kept only for the cells that it touches; when the plan is full, the shot at
+//              hand and those after it are taken as exact and counted
 // Allocation   in the constructor only
 #pragma once
 
