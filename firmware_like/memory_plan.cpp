@@ -27,9 +27,10 @@ int surface_shots(const CellConfig& c) {
   return static_cast<int>(along(c.plate.largest_x_mm) * along(c.plate.largest_y_mm)) + few_shots;
 }
 
+// A power of two, no span shorter than asked for.
 int finest_spans(double length_mm, double span_mm) {
-  const auto wanted = static_cast<unsigned>(std::ceil(length_mm / span_mm));
-  return static_cast<int>(std::clamp(std::bit_ceil(wanted), 8u, 256u));
+  const auto wanted = static_cast<unsigned>(std::max(length_mm / span_mm, 1.0));
+  return static_cast<int>(std::clamp(std::bit_floor(wanted), 8u, 256u));
 }
 
 }  // namespace

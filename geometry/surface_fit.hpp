@@ -31,7 +31,7 @@ struct SurfaceFitSettings {
   // plane look like steps of height where the plate slopes; below a few micrometres a finer net follows those.
   double tolerance_mm = 0.005;
   double noise_mm = 0;           // of a point of weight 1; 0: estimated from the finest net's residual
-  double fairing = 1e-8;         // relative to the data: the ratio of the matrices' traces
+  double fairing = 1e-5;         // relative to the data: the ratio of the matrices' traces
 };
 
 struct SurfaceFitReport {

@@ -38,7 +38,7 @@ constexpr double hint_inside_mm = 10;
 
 BoundaryTracker::BoundaryTracker(const TrackerSettings& settings) : settings_{settings} {
   edges_.reserve(settings.max_edge_points);
-  corners_.reserve(16);
+  corners_.reserve(settings.max_corners);
 }
 
 std::size_t BoundaryTracker::bytes() const {

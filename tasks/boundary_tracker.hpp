@@ -72,6 +72,7 @@ struct TrackerSettings {
   double corner_merge_mm = 20;     // corners nearer than this are one, seen twice
   int max_seek_steps = 60, max_turns = 3, max_backs = 2, max_shots = 96;
   std::size_t max_edge_points = 24000;
+  std::size_t max_corners = 64;    // false ones included, which geometry/corner_choice.hpp sorts out
 };
 
 class BoundaryTracker {

@@ -5,7 +5,7 @@
 namespace moldloft::tasks {
 
 SurfaceTask::SurfaceTask(const SurfaceTaskSettings& settings)
-    : settings_{settings}, outline_{settings.max_edge_points, settings.outline}, fit_{settings.fit} {
+    : settings_{settings}, corners_{settings.corners}, outline_{settings.max_edge_points, settings.outline}, fit_{settings.fit} {
   reserve_.reserve(settings.max_boundary_shots * settings.reserve_points_per_shot);
   reserve_ends_.reserve(settings.max_boundary_shots);
 }
@@ -31,9 +31,11 @@ void SurfaceTask::keep(ShotView& shot, const geometry::RigidMotion& world_from_s
   reserve_ends_.push_back(reserve_.size());
 }
 
-void SurfaceTask::build_outline(std::span<const Eigen::Vector2d> edges, std::span<const Eigen::Vector2d> corner_hints) {
-  stage_ = Stage::building_outline;
-  if (const auto begun = outline_.begin(edges, corner_hints); !begun) fail(begun.error());
+void SurfaceTask::build_outline(std::span<const Eigen::Vector2d> edges,
+                                std::span<const Eigen::Vector2d> corner_candidates) {
+  edges_ = edges;
+  corners_.begin(edges, corner_candidates);
+  stage_ = Stage::choosing_corners;
 }
 
 void SurfaceTask::fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner) {
@@ -49,12 +51,13 @@ void SurfaceTask::solve() {
 }
 
 bool SurfaceTask::has_work() const {
-  return stage_ == Stage::building_outline || stage_ == Stage::folding_reserve || stage_ == Stage::folding ||
+  return stage_ == Stage::choosing_corners || stage_ == Stage::building_outline || stage_ == Stage::folding_reserve || stage_ == Stage::folding ||
          stage_ == Stage::solving;
 }
 
 void SurfaceTask::step(Instant) {
   switch (stage_) {
+    case Stage::choosing_corners: return step_corners();
     case Stage::building_outline: return step_outline();
     case Stage::folding_reserve: return step_reserve();
     case Stage::folding: return step_fold();
@@ -66,6 +69,14 @@ void SurfaceTask::step(Instant) {
 void SurfaceTask::fail(geometry::Error error) {
   error_ = error;
   stage_ = Stage::failed;
+}
+
+void SurfaceTask::step_corners() {
+  const auto chosen = corners_.step();
+  if (!chosen) return fail(chosen.error());
+  if (!*chosen) return;
+  stage_ = Stage::building_outline;
+  if (const auto begun = outline_.begin(edges_, corners_.corners()); !begun) fail(begun.error());
 }
 
 void SurfaceTask::step_outline() {

@@ -16,6 +16,7 @@
 #include <span>
 #include <vector>
 
+#include "geometry/corner_choice.hpp"
 #include "geometry/outline.hpp"
 #include "geometry/plan_map.hpp"
 #include "geometry/rigid_motion.hpp"
@@ -26,6 +27,7 @@
 namespace moldloft::tasks {
 
 struct SurfaceTaskSettings {
+  geometry::CornerChoiceSettings corners;
   geometry::OutlineSettings outline;
   geometry::SurfaceFitSettings fit;
   std::size_t max_edge_points = 24000;
@@ -38,6 +40,7 @@ class SurfaceTask final : public BackgroundTask {
  public:
   enum class Stage : std::uint8_t {
     idle,
+    choosing_corners,
     building_outline,
     folding_reserve,  // the outline is ready; shots of the surface may be planned
     open,             // takes the next shot
@@ -52,7 +55,8 @@ class SurfaceTask final : public BackgroundTask {
   void begin();
   // Keeps a thinned copy of the plate's points of a boundary shot. At once: 3,000 points take about 50 us.
   void keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner);
-  void build_outline(std::span<const Eigen::Vector2d> edges, std::span<const Eigen::Vector2d> corner_hints);
+  // `corner_candidates`: what the tracker took for corners; more than four is no harm.
+  void build_outline(std::span<const Eigen::Vector2d> edges, std::span<const Eigen::Vector2d> corner_candidates);
   // Folds a surface shot in; `shot` and its frame stay untouched by others until stage() is open again.
   void fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner);
   void solve();
@@ -68,7 +72,7 @@ class SurfaceTask final : public BackgroundTask {
   int shots() const { return shots_; }
   double progress() const { return fit_.progress(); }
 
-  std::size_t outline_bytes() const { return outline_.bytes(); }
+  std::size_t outline_bytes() const { return corners_.bytes() + outline_.bytes(); }
   std::size_t fit_bytes() const { return fit_.bytes(); }
   std::size_t reserve_bytes() const { return reserve_.capacity() * sizeof(Eigen::Vector3d); }
   std::size_t reserve_used_bytes() const { return reserve_.size() * sizeof(Eigen::Vector3d); }
@@ -77,15 +81,18 @@ class SurfaceTask final : public BackgroundTask {
   static constexpr std::size_t chunk_points = 512;  // at about 0.2 us a point a step stays near 100 us
 
   void fail(geometry::Error error);
+  void step_corners();
   void step_outline();
   void step_reserve();
   void step_fold();
   void step_solve();
 
   SurfaceTaskSettings settings_;
+  geometry::CornerChoice corners_;
   geometry::OutlineBuilder outline_;
   geometry::PlanMap map_;
   geometry::SurfaceFit fit_;
+  std::span<const Eigen::Vector2d> edges_;
   std::vector<Eigen::Vector3d> reserve_;
   std::vector<std::size_t> reserve_ends_;  // one past each boundary shot's points
   std::array<Eigen::Vector3d, chunk_points> chunk_;

@@ -1,0 +1,61 @@
+// Which of the corners that a tracker believes to have seen are corners of the plate.
+//
+// A tracker looks at one field at a time: a notch, a saw tooth of a torn edge or a tack weld looks like a corner there.
+// Seen from farther away the boundary goes straight on past a false corner and turns at a true one. So each candidate is
+// looked at with the edge points in a ring around it: two branches leave it, each is fitted by a line, the lines give
+// the turn and, where they meet, the corner itself. Candidates that come to lie together are one.
+//
+// Frame        plan view, mm
+// Work         step() examines one candidate: one pass over the edge points, about 5 ns a point
+// Allocation   in the constructor only
+// Failure      Error::not_four_sided when other than four are left, too_few_points without candidates
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <expected>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "geometry/error.hpp"
+
+namespace moldloft::geometry {
+
+struct CornerChoiceSettings {
+  double ring_inner_mm = 20, ring_outer_mm = 110;  // teeth and notches are smaller, sides are longer
+  double min_turn = 0.52;                          // rad (30 degrees)
+  double merge_mm = 45;                            // corners nearer than this are one
+  std::size_t max_candidates = 64;
+};
+
+class CornerChoice {
+ public:
+  explicit CornerChoice(const CornerChoiceSettings&);
+
+  // Both spans are the caller's and must stay until the work is done.
+  void begin(std::span<const Eigen::Vector2d> edges, std::span<const Eigen::Vector2d> candidates);
+  std::expected<bool, Error> step();  // true when the corners are chosen
+  // Counter-clockwise; the side from the first to the second is one of the longer pair.
+  const std::array<Eigen::Vector2d, 4>& corners() const { return corners_; }
+  std::size_t bytes() const;
+
+ private:
+  struct Corner {
+    Eigen::Vector2d position;
+    double turn = 0, rms_mm = 0;
+  };
+  std::optional<Corner> examine(const Eigen::Vector2d& candidate);
+  void gather(const Eigen::Vector2d& about);
+  void keep(const Corner&);
+  std::expected<void, Error> arrange();
+
+  CornerChoiceSettings settings_;
+  std::span<const Eigen::Vector2d> edges_, candidates_;
+  std::vector<Eigen::Vector2d> ring_;
+  std::vector<Corner> chosen_;
+  std::array<Eigen::Vector2d, 4> corners_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace moldloft::geometry

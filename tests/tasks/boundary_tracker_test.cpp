@@ -1,0 +1,107 @@
+#include "tasks/boundary_tracker.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "tasks/flat_world.hpp"
+
+using namespace moldloft;
+using namespace moldloft::tasks;
+using Eigen::Vector2d;
+
+namespace {
+
+std::vector<Vector2d> placed(std::vector<Vector2d> corners, double turn) {
+  Vector2d middle = Vector2d::Zero();
+  for (const auto& c : corners) middle += c / static_cast<double>(corners.size());
+  for (auto& c : corners) c = Eigen::Rotation2Dd(turn) * (c - middle) + Vector2d{500, 20};
+  return corners;
+}
+
+const std::vector<Vector2d> square{{0, 0}, {305, 0}, {305, 305}, {0, 305}};
+const std::vector<Vector2d> rectangle{{0, 0}, {600, 0}, {600, 150}, {0, 150}};
+const std::vector<Vector2d> trapezoid{{0, 0}, {305, 0}, {245, 254}, {60, 254}};
+const std::vector<Vector2d> sheared{{0, 0}, {260, 0}, {390, 225}, {130, 225}};  // corners of 60 and 120 degrees
+
+double distance_to_outline(const Vector2d& p, const std::vector<Vector2d>& outline) {
+  double least = 1e9;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Vector2d a = outline[i], d = outline[(i + 1) % outline.size()] - a;
+    const double t = std::clamp((p - a).dot(d) / d.squaredNorm(), 0.0, 1.0);
+    least = std::min(least, (p - a - t * d).norm());
+  }
+  return least;
+}
+
+const ShotPlace start{.centre = {500, 20, 5}, .head_yaw = 0};
+
+}  // namespace
+
+TEST_CASE("the loop closes on every four-sided plate, however it is turned, and sees all four corners") {
+  BoundaryTracker tracker{TrackerSettings{.overlap_mm = 45}};
+  for (const auto& shape : {square, rectangle, trapezoid, sheared}) {
+    for (double turn = 0; turn < 6.28; turn += 0.21) {
+      const FlatWorld world{.outline = placed(shape, turn)};
+      const Walk walk = walk_round(tracker, world, start);
+      INFO("turned by ", turn);
+      REQUIRE(walk.last.to == TrackState::closed);
+      for (const auto& corner : world.outline) {
+        double nearest = 1e9;
+        for (const auto& seen : tracker.corners()) nearest = std::min(nearest, (seen - corner).norm());
+        CHECK(nearest < 3);
+      }
+    }
+  }
+}
+
+TEST_CASE("every edge point that is remembered lies on the outline, and the outline has no stretch without one") {
+  BoundaryTracker tracker{TrackerSettings{.overlap_mm = 45}};
+  const FlatWorld world{.outline = placed(trapezoid, 0.7)};
+  REQUIRE(walk_round(tracker, world, start).last.to == TrackState::closed);
+  for (const auto& p : tracker.edge_points()) CHECK(distance_to_outline(p, world.outline) < 0.3);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Vector2d a = world.outline[i], b = world.outline[(i + 1) % 4];
+    for (double t = 0.02; t < 1; t += 0.02) {
+      const Vector2d p = a + t * (b - a);
+      const bool seen = std::any_of(tracker.edge_points().begin(), tracker.edge_points().end(),
+                                    [&](const Vector2d& e) { return (e - p).norm() < 6; });
+      CHECK(seen);
+    }
+  }
+}
+
+TEST_CASE("a boundary parallel to the stripes is found by turning the head") {
+  BoundaryTracker tracker{TrackerSettings{}};
+  const FlatWorld world{.outline = placed(square, 0)};  // stripes along y, the first edge met along x too
+  const Walk walk = walk_round(tracker, world, start);
+  CHECK(walk.last.to == TrackState::closed);
+  CHECK(walk.turns >= 1);
+}
+
+TEST_CASE("a start off the plate is said so at once") {
+  BoundaryTracker tracker{TrackerSettings{}};
+  const FlatWorld world{.outline = placed(square, 0)};
+  const Walk walk = walk_round(tracker, world, {.centre = {900, 20, 5}, .head_yaw = 0});
+  CHECK(walk.last.to == TrackState::failed);
+  CHECK(walk.shots == 1);
+  CHECK(std::string{walk.last.text.view()} == "no plate under the scanner at x 900 y 20 mm: move [start] onto the plate");
+}
+
+TEST_CASE("a plate without an end within the seek limit is said so") {
+  BoundaryTracker tracker{TrackerSettings{.max_seek_steps = 5}};
+  const FlatWorld world{.outline = {{-5000, -5000}, {5000, -5000}, {5000, 5000}, {-5000, 5000}}};
+  const Walk walk = walk_round(tracker, world, start);
+  CHECK(walk.last.to == TrackState::failed);
+  CHECK(walk.last.action == TrackAction::report_no_edge);
+  CHECK(walk.shots == 6);
+}
+
+TEST_CASE("a plate with more boundary than the plan has shots for is said so") {
+  BoundaryTracker tracker{TrackerSettings{.max_shots = 8}};
+  const FlatWorld world{.outline = placed(rectangle, 0.3)};
+  const Walk walk = walk_round(tracker, world, start);
+  CHECK(walk.last.to == TrackState::failed);
+  CHECK(walk.last.action == TrackAction::report_too_large);
+}

@@ -1,0 +1,73 @@
+// A flat plate on a table, seen without noise by a level scanner: enough world to drive the tracker.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "hal/frame.hpp"
+#include "tasks/boundary_tracker.hpp"
+#include "tasks/shot_view.hpp"
+
+namespace moldloft::tasks {
+
+struct FlatWorld {
+  std::vector<Eigen::Vector2d> outline;  // counter-clockwise, convex
+  double plate_z = 6, table_z = 0;
+
+  bool inside(const Eigen::Vector2d& p) const {
+    for (std::size_t i = 0; i < outline.size(); ++i) {
+      const Eigen::Vector2d side = outline[(i + 1) % outline.size()] - outline[i], to = p - outline[i];
+      if (side.x() * to.y() - side.y() * to.x() < 0) return false;
+    }
+    return true;
+  }
+
+  // 100 stripes of 500 points over 102 x 102 mm, in scanner coordinates.
+  void expose(const geometry::RigidMotion& world_from_scanner, hal::Frame& frame) const {
+    frame.stripe_count = 100;
+    frame.point_count = 50000;
+    const double height = world_from_scanner.translation().z();
+    for (std::uint32_t s = 0; s < 100; ++s) {
+      frame.stripes[s] = {.index = static_cast<std::uint16_t>(s), .first = s * 500, .count = 500};
+      for (std::uint32_t i = 0; i < 500; ++i) {
+        const double x = -51 + 102 * s / 99.0, y = -51 + 102 * i / 499.0;
+        const Eigen::Vector3d p = world_from_scanner * Eigen::Vector3d{x, y, 0};
+        const std::size_t k = s * 500 + i;
+        frame.x[k] = static_cast<float>(x);
+        frame.y[k] = static_cast<float>(y);
+        frame.z[k] = static_cast<float>((inside(p.head<2>()) ? plate_z : table_z) - height);
+      }
+    }
+  }
+};
+
+// Drives the tracker round a plate until it closes or gives up; returns the last step.
+struct Walk {
+  BoundaryTracker::Step last;
+  int shots = 0, turns = 0;
+};
+inline Walk walk_round(BoundaryTracker& tracker, const FlatWorld& world, const ShotPlace& start) {
+  hal::Frame frame{100, 50000};
+  ShotView view{100, 50000, {}};
+  Walk walk;
+  ShotPlace place = start;
+  tracker.begin(start);
+  for (; walk.shots < 200;) {
+    ++walk.shots;
+    const auto motion = geometry::turned_about_z(place.head_yaw, place.centre);
+    world.expose(motion, frame);
+    const bool seeking = tracker.state() == TrackState::seek_edge;
+    const bool found = view.look(frame, motion.inverse() * tracker.plate_hint(), seeking ? 60 : 18);
+    // Without a table height to tell them apart the higher of the two levels is the plate.
+    const bool on_plate = found && !view.runs().empty() &&
+                          frame.z[view.runs().front().first + view.runs().front().stripe * 500u] > world.table_z + 1 - place.centre.z();
+    walk.last = tracker.take({.world_from_scanner = motion, .plate_found = on_plate, .plate_z_mm = world.plate_z, .view = view.boundary()});
+    walk.turns += walk.last.action == TrackAction::turn;
+    if (!walk.last.next) break;
+    place = *walk.last.next;
+  }
+  return walk;
+}
+
+}  // namespace moldloft::tasks
