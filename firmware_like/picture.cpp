@@ -192,8 +192,9 @@ std::string legend(const PlateField& field, double limit, double left, double to
                        top + i * step, step + 0.5, colour(1 - 2.0 * i / (colours - 1)));
   }
   for (const double part : {1.0, 0.5, 0.0, -0.5, -1.0}) {
-    svg += fmt::format("<text x='{:.1f}' y='{:.1f}' class='small'>{:+g}</text>\n", left + 19,
-                       top + (1 - part) / 2 * height + 4, part * limit);
+    const std::string value = part == 0 ? "0" : fmt::format("{:+g}", part * limit);
+    svg += fmt::format("<text x='{:.1f}' y='{:.1f}' class='small'>{}</text>\n", left + 19,
+                       top + (1 - part) / 2 * height + 4, value);
   }
   svg += fmt::format("<text x='{:.1f}' y='{:.1f}' class='small'>{}</text>\n", left, top - 9, field.unit);
   return svg;

@@ -83,6 +83,7 @@ const std::set<std::string, std::less<>> wide_for_now = {
     "firmware_like/run_command.cpp",
     "firmware_like/run_folder.cpp",
     "firmware_like/toml_section.cpp",
+    "geometry/corner_choice.cpp",
     "hal/psc1.hpp",
     "hal/run_store.hpp",
     "hal/serial_link.hpp",
