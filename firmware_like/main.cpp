@@ -1,6 +1,9 @@
 // The controller program.
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 
+#include "firmware_like/machines.hpp"
 #include "firmware_like/run_command.hpp"
 
 using namespace moldloft::firmware_like;
@@ -20,6 +23,8 @@ int main(int argc, char** argv) {
   fit_command->add_option("run", fit.run, "the run's folder")->required();
   fit_command->add_option("--out", fit.out, "where the results go")->required();
 
+  auto* machines_command = app.add_subcommand("machines", "print the state machines as Mermaid diagrams");
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -27,5 +32,9 @@ int main(int argc, char** argv) {
   }
   if (*run_command) return run_cell(run);
   if (*fit_command) return fit_run(fit);
+  if (*machines_command) {
+    fmt::print("{}", machine_diagrams());
+    return exit_done;
+  }
   return exit_failed;
 }

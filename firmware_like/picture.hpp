@@ -1,5 +1,5 @@
-// The overview of a run as SVG: the plate in plan view, once with its shape in colour, once with the deviation, each with
-// a scale; over them the outline, the tracker's path and the shots. World coordinates, mm.
+// The overview of a run as SVG: the plate in plan view, once with its shape in colour, once with the deviation, each
+// with a scale; over them the outline, the tracker's path and the shots. World coordinates, mm.
 //
 // Set-up and result time only: allocates.
 #pragma once
@@ -24,7 +24,7 @@ struct PlateField {
 };
 
 struct OverviewInput {
-  std::string title, subtitle;
+  std::string title, subtitle;                        // a path in the title is cut down to the file's name
   const geometry::BSplineSurface* surface = nullptr;  // null: only outline, path and shots
   std::span<const Eigen::Vector2d> edge_points;
   std::span<const Eigen::Vector2d> corners;

@@ -30,9 +30,8 @@ BasisValues cubic_basis(std::span<const double> knots, int k, double t);
 // The Greville abscissa of control point i: where a control point sits on a straight line at unit speed.
 double greville(std::span<const double> knots, int i);
 
-// Coefficient i, over the knots `fine`, of the spline that has `coefficients` over the knots `coarse`; `fine`
-// must contain every knot of `coarse`. Exact: the spline's blossom at three consecutive fine knots (Ramshaw
-// 1987).
+// Coefficient i, over the knots `fine`, of the spline that has `coefficients` over the knots `coarse`; `fine` must
+// contain every knot of `coarse`. Exact: the spline's blossom at three consecutive fine knots (Ramshaw 1987).
 double refined_coefficient(std::span<const double> coarse, std::span<const double> coefficients,
                            std::span<const double> fine, int i);
 

@@ -1,8 +1,8 @@
 // Which of the corners that a tracker believes to have seen are corners of the plate.
 //
 // A tracker looks at one field at a time: a notch, a saw tooth of a torn edge or a tack weld looks like a corner there.
-// Seen from farther away the boundary goes straight on past a false corner and turns at a true one. So each candidate is
-// looked at with the edge points in a ring around it: two branches leave it, each is fitted by a line, the lines give
+// Seen from farther away the boundary goes straight on past a false corner and turns at a true one. So each candidate
+// is looked at with the edge points in a ring around it: two branches leave it, each is fitted by a line, the lines give
 // the turn and, where they meet, the corner itself. Candidates that come to lie together are one.
 //
 // Frame        plan view, mm

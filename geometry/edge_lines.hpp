@@ -1,5 +1,4 @@
-// Lines through edge points in plan view: robust fits, false points, and the split of a bent stretch into two
-// lines.
+// Lines through edge points in plan view: robust fits, false points, and the split of a bent stretch into two lines.
 //
 // Units        mm, plan view (x, y) of the edge points
 // Cost         fit_edge_line O(n) a pass, five passes; best_split O(n); is_false_point constant
@@ -30,9 +29,8 @@ EdgeLine fit_edge_line(std::span<const EdgePoint> points);
 // Where two lines meet. Lines within 0.03 rad of parallel give nothing.
 std::optional<Eigen::Vector2d> meeting_point(const EdgeLine&, const EdgeLine&);
 
-// True when the point at `index` lies on neither the line of its five predecessors nor that of its five
-// successors: a corner's points always lie on one of them. Near an end the four outermost points stand for
-// what is missing.
+// True when the point at `index` lies on neither the line of its five predecessors nor that of its five successors: a
+// corner's points always lie on one of them. Near an end the four outermost points stand for what is missing.
 bool is_false_point(std::span<const EdgePoint> points, std::size_t index);
 
 // The split s for which the two lines through points [0, s) and [s, n) leave the smallest sum of squares,

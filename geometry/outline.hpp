@@ -6,9 +6,9 @@
 // neighbouring sides are extended to meet, and the meeting point is the corner.
 //
 // Frame        world, plan view (x, y), mm
-// Work         step() does one bounded piece (one pass over one side's points); the caller decides how many a
-// tick Allocation   in the constructor only Failure      Error::not_four_sided, too_few_points (a side
-// without points), collinear (sides that do not meet)
+// Work         step() does one bounded piece (one pass over one side's points); the caller decides how many a tick
+// Allocation   in the constructor only
+// Failure      Error::not_four_sided, too_few_points (a side without points), collinear (sides that do not meet)
 #pragma once
 
 #include <Eigen/Core>

@@ -1,7 +1,6 @@
-// The plan map X(u, v) = (x, y): the bilinearly blended Coons patch of the outline's four sides (thesis
-// eq. 2.65), and its inverse. The plate is explicit (z over x, y), so a point's parameters are those of its
-// plan position: safe where projecting on a wavy base surface is not (field notes on the thesis's wave
-// surface).
+// The plan map X(u, v) = (x, y): the bilinearly blended Coons patch of the outline's four sides (thesis eq. 2.65),
+// and its inverse. The plate is explicit (z over x, y), so a point's parameters are those of its plan position: safe
+// where projecting on a wavy base surface is not (field notes on the thesis's wave surface).
 //
 // Outside [0, 1]^2 the sides go on along their end tangents.
 //
@@ -10,8 +9,7 @@
 // Accuracy     the inverse satisfies |X(u, v) - (x, y)| <= 1e-10 mm
 // Cost         a point with a neighbour's (u, v) as guess: 2-3 Newton steps, about 0.15 us
 // Allocation   none in invert(); the constructor copies four curves
-// Failure      Error::folded_map from check(); outside_domain from invert() when the point lies off the plate
-// by more
+// Failure      Error::folded_map from check(); outside_domain from invert() when the point lies off the plate by more
 //              than the margin asked for
 // Expects      sides that share one uniform clamped knot vector, as OutlineBuilder makes them
 #pragma once

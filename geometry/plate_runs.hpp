@@ -6,14 +6,12 @@
 // bridged, an outlier skipped. At a jump the plate is the nearer (higher) side: a jump upwards is something
 // that lies on the plate or hides it, not the plate's edge.
 //
-// Frame        scanner coordinates (mm): stripes run along +y, follow one another along +x, z towards the
-// scanner Accuracy     an edge lies half a point spacing beyond the run's last good point, so without bias;
-// standard deviation
+// Frame        scanner coordinates (mm): stripes run along +y, follow one another along +x, z towards the scanner
+// Accuracy     an edge lies half a point spacing beyond the run's last good point, so without bias; standard deviation
 //              0.29 spacings along the stripe
 // Cost         O(points); 50,000 points in 100 stripes take about 0.5 ms
 // Allocation   in the constructor only
-// Failure      Error::not_on_plate when the hint hits nothing, Error::capacity when the frame is larger than
-// planned
+// Failure      Error::not_on_plate when the hint hits nothing, Error::capacity when the frame is larger than planned
 #pragma once
 
 #include <Eigen/Core>

@@ -3,13 +3,11 @@
 // With d_s the offset of shot s, prior weight rho = (sigma / sigma_shot)^2, and L the band factor of the
 // surface's normal equations, the bordered system is eliminated on the shots:
 //     S d = h - W' y,   S = D + rho I - W' W,   W = L^-1 B,   y = L^-1 r
-// where column s of B holds the sums of the basis functions over the points of shot s (the right-hand side
-// for z = 1), D the number of points and h the sum of heights of every shot. The surface follows from L' c =
-// y - W d.
+// where column s of B holds the sums of the basis functions over the points of shot s (the right-hand side for z = 1),
+// D the number of points and h the sum of heights of every shot. The surface follows from L' c = y - W d.
 //
-// Memory       a shot's moments are kept only for the cells that it touches; when the plan is full, the shot
-// at hand and
-//              those after it are taken as exact and counted
+// Memory       a shot's moments are kept only for the cells that it touches; when the plan is full, the shot at
+//              hand and those after it are taken as exact and counted
 // Allocation   in the constructor only
 #pragma once
 

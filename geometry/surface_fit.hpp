@@ -1,16 +1,15 @@
-// The streaming surface fit: points are folded into Bernstein moments cell by cell and forgotten; nets of 2^k
-// by 2^l spans come out of the same pass; generalized cross-validation picks one.
+// The streaming surface fit: points are folded into Bernstein moments cell by cell and forgotten; nets of 2^k by 2^l
+// spans come out of the same pass; generalized cross-validation picks one.
 //
 // Model        z(u, v) = sum N_i(u) M_j(v) z_ij + d_s, with d_s the unknown height error of shot s (robot
-// repeatability),
-//              a zero-mean random effect with standard deviation shot_sigma_mm: overlapping shots and
-//              neighbours estimate it together with the surface. (u, v) are plan-view parameters
-//              (plan_map.hpp).
-// Moments      per cell 7 x 7 of B6 B6 and 4 x 4 of z B3 B3 (field notes, "Bernstein moments"), per shot 4 x
-// 4 of B3 B3. Fairing      a thin-plate term, tiny relative to the data, so that cells without points stay
-// defined Frame        world, mm Work         add() costs O(points) and is called with bounded chunks; step()
-// does one bounded piece of the solution Memory       fixed by the settings, never by the number of points;
-// all of it allocated in the constructor Failure      Error::capacity, singular, not_finite, too_few_points
+//              repeatability), a zero-mean random effect with standard deviation shot_sigma_mm: overlapping shots and
+//              neighbours estimate it together with the surface. (u, v) are plan-view parameters (plan_map.hpp)
+// Moments      per cell 7 x 7 of B6 B6 and 4 x 4 of z B3 B3 (field notes, "Bernstein moments"), per shot 4 x 4 of B3 B3
+// Fairing      a thin-plate term, tiny relative to the data, so that cells without points stay defined
+// Frame        world, mm
+// Work         add() costs O(points) and is called with bounded chunks; step() does one bounded piece of the solution
+// Memory       fixed by the settings, never by the number of points; all of it allocated in the constructor
+// Failure      Error::capacity, singular, not_finite, too_few_points
 #pragma once
 
 #include <cstdint>

@@ -27,8 +27,7 @@ namespace moldloft::host_sim {
 enum class ArmKind { scara, gantry };
 std::expected<ArmKind, SimError> arm_named(std::string_view);
 
-// The scanner 140 mm off the flange along the tip's y, its field's centre 300 mm below it, its z axis up
-// again.
+// The scanner 140 mm off the flange along the tip's y, its field's centre 300 mm below it, its z axis up again.
 geometry::RigidMotion nominal_mount();
 
 struct Placement {
@@ -58,8 +57,7 @@ struct CellDescription {
 
 std::unique_ptr<Arm> make_arm(const CellDescription&);
 
-// The plate on its place. Fails when it cannot be read or made, or when no place for it is found under the
-// arm.
+// The plate on its place. Fails when it cannot be read or made, or when no place for it is found under the arm.
 std::expected<PlateInstance, SimError> placed_plate(const CellDescription&);
 
 // Over the middle of the cell, the field's centre 15 mm over the table, stripes along the world's y: where

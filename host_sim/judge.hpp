@@ -6,8 +6,7 @@
 // the measured one lies above. The outline's figure is the Hausdorff distance of the outlines in plan.
 //
 // Cost         about 50 ms
-// Failure      one line: a file that is missing or not what it should be, a surface that nowhere lies over
-// the plate
+// Failure      one line: a file that is missing or not what it should be, a surface that nowhere lies over the plate
 #pragma once
 
 #include <array>
@@ -37,11 +36,10 @@ std::expected<Verdict, SimError> judge(const PlateInstance& truth, const geometr
                                        const std::array<Eigen::Vector2d, 4>& measured_corners);
 
 // surface.json:
-// {"schema":1,"unit":"mm","degree":[3,3],"knots_u":[..],"knots_v":[..],"control":[[[x,y,z],..],..]}
+//     {"schema":1,"unit":"mm","degree":[3,3],"knots_u":[..],"knots_v":[..],"control":[[[x,y,z],..],..]}
 std::expected<geometry::BSplineSurface, SimError> read_surface(const std::string& path);
 
-// Judges a run folder: reads surface.json and summary.json (boundary.corners_mm), writes `truth` into
-// summary.json.
+// Judges a run folder: reads surface.json and summary.json (boundary.corners_mm), writes `truth` into summary.json.
 std::expected<Verdict, SimError> judge_run(const std::string& folder, const PlateInstance& truth);
 
 }  // namespace moldloft::host_sim

@@ -52,8 +52,7 @@ class Optics {
               hal::Frame&) noexcept;
 
   const OpticsSettings& settings() const noexcept { return settings_; }
-  // Half the extent of what a frame can hold: the field at the far end of the depth range, and room for
-  // noise.
+  // Half the extent of what a frame can hold: the field at the far end of the depth range, and room for noise.
   Eigen::Vector3d half_extent_mm() const noexcept;
 
  private:

@@ -7,8 +7,8 @@
 //     cylinder   z = sqrt(R^2 - x^2) - R        crown along y; R = 1000 mm unless given
 //     saddle     z = A (p^2 - q^2)              -A..A
 //     twist      z = A p q                      -A..A, all four corners out of plane
-//     dome       z = sqrt(R^2 - x^2 - y^2) - sqrt(R^2 - d^2/2) with d^2 = a^2 + b^2 and a crown 2 A over the
-//     corners wave       z = A sin(pi p) cos(pi q / 2)  -A..A
+//     dome       z = sqrt(R^2 - x^2 - y^2) - sqrt(R^2 - d^2/2) with d^2 = a^2 + b^2 and a crown 2 A over the corners
+//     wave       z = A sin(pi p) cos(pi q / 2)  -A..A
 //
 // Failure      one line that names the plate and what is impossible about it
 #pragma once
@@ -30,9 +30,8 @@ std::span<const std::string_view> outline_names();
 std::expected<Shape, SimError> shape_named(std::string_view);
 std::expected<OutlineKind, SimError> outline_named(std::string_view);
 
-// Lengths of 0 take the kind's default, chosen to fit under the SCARA arm like the thesis's plate of 305 x
-// 305 mm: rectangle 305 x 229, trapezoid 305 below, 229 above, 254 deep, parallelogram 244 x 244 sheared
-// by 61.
+// Lengths of 0 take the kind's default, chosen to fit under the SCARA arm like the thesis's plate of 305 x 305 mm:
+// rectangle 305 x 229, trapezoid 305 below, 229 above, 254 deep, parallelogram 244 x 244 sheared by 61.
 struct OutlineSizes {
   double width_mm = 0;      // along x, the lower side
   double depth_mm = 0;      // along y

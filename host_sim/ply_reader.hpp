@@ -2,8 +2,7 @@
 // with any number of corners (cut into fans).
 //
 // Unit         the file's own; mesh_plate.hpp scales
-// Failure      one line with the file's name: it cannot be read, is not a PLY, is in a form not known, ends
-// too early,
+// Failure      one line with the file's name: it cannot be read, is not a PLY, is in a form not known, ends too early,
 //              has no faces, names a vertex that is not there, holds a coordinate that is not a number
 #pragma once
 

@@ -44,8 +44,7 @@ inline SineCosine portable_sin_cos(double x) noexcept {
   constexpr double half_pi_high = 1.57079632673412561417e+00, half_pi_low = 6.07710050650619224932e-11;
   const double quarters = std::nearbyint(x * two_over_pi);
   const double r = (x - quarters * half_pi_high) - quarters * half_pi_low, r2 = r * r;
-  // Taylor by Horner, sin r = r (1 - r2/6 (1 - r2/20 (...))); |r| <= pi/4: the first term left out is below
-  // 1e-17.
+  // Taylor by Horner, sin r = r (1 - r2/6 (1 - r2/20 (...))); |r| <= pi/4: the first term left out is below 1e-17.
   double s = 0.0, c = 0.0;
   for (int k = 7; k >= 0; --k) s = (1.0 + s) * r2 * sine_ratios[k];
   for (int k = 8; k >= 0; --k) c = (1.0 + c) * r2 * cosine_ratios[k];

@@ -57,8 +57,7 @@ class RayCast {
   // Where the ray enters the slab between the plate's highest point and the table, and where it leaves it.
   std::pair<double, double> slab(const Ray&) const noexcept;
 
-  // What a descending ray meets first; `edges` must hold all that it can cross in plan. `guess` is a t near
-  // the hit.
+  // What a descending ray meets first; `edges` must hold all that it can cross in plan. `guess` is a t near the hit.
   Hit first_hit(const Ray&, std::span<const PlanEdge> edges, double guess) const noexcept;
   // The same where the ray is known to cross no edge.
   Hit hit_inside(const Ray&, double guess) const noexcept;

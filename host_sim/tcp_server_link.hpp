@@ -4,7 +4,8 @@
 // open() listens; the state is `opening` until a client has connected, `open` while it is there, `lost` when
 // it has gone; open() again waits for the next one.
 //
-// Thread, blocking: as ByteLink says
+// Thread       as ByteLink says
+// Blocking     as ByteLink says
 // Allocation   none after listen_on()
 // Failure      listen_on() says why a port cannot be had
 #pragma once

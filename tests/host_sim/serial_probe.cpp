@@ -1,9 +1,8 @@
-// Opens a serial device with the controller's own driver, sends PNG, prints the answer. Exit code 0 when one
-// came.
+// Opens a serial device with the controller's own driver, sends PNG, prints the answer. Exit code 0 when one came.
 #include <cstdio>
 #include <string>
-#include <thread>
 
+#include "hal/clock.hpp"
 #include "hal/robot_line.hpp"
 #include "hal/serial_link.hpp"
 
@@ -22,12 +21,13 @@ int main(int argc, char** argv) {
   ping.verb = robot_line::Verb::png;
   const auto line = robot_line::format(ping);
   if (link->write(std::as_bytes(std::span{line.view()})) != line.view().size()) return 4;
+  SteadyClock clock;
   std::string answer;
   for (int wait = 0; wait < 2000 && !answer.ends_with('\n'); ++wait) {
     std::byte bytes[64];
     const auto count = link->read(bytes);
     answer.append(reinterpret_cast<const char*>(bytes), count);
-    if (count == 0) std::this_thread::sleep_for(1ms);
+    if (count == 0) clock.sleep_until(clock.now() + 1ms);
   }
   link->close();
   std::printf("%s", answer.c_str());

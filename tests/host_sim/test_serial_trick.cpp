@@ -9,6 +9,7 @@
 #include <string>
 #include <thread>
 
+#include "hal/clock.hpp"
 #include "hal/psc1.hpp"
 #include "hal/tcp_link.hpp"
 #include "host_sim/cell_description.hpp"
@@ -38,7 +39,7 @@ class Robot {
     hal::SteadyClock clock;
     while (!end_) {
       server_.step(clock.now());
-      std::this_thread::sleep_for(1ms);
+      clock.sleep_until(clock.now() + 1ms);
     }
   }
   RobotServer server_;
@@ -68,7 +69,8 @@ TEST_CASE("the controller's own serial driver opens the robot's pseudo-terminal,
   REQUIRE_MESSAGE(link.has_value(), link.error().what);
   Robot robot(**link);
   CHECK(probe(name_of_this_test(), true) == 0);
-  std::this_thread::sleep_for(20ms);
+  hal::SteadyClock clock;
+  clock.sleep_until(clock.now() + 20ms);
   CHECK(probe(name_of_this_test(), true) == 0);  // after the first has hung up
 }
 
@@ -121,9 +123,10 @@ TEST_CASE("a client on the scanner's port comes, goes and comes again") {
   device.open();
   CHECK(device.state() == hal::LinkState::opening);
   const auto until = [](auto&& condition) {
+    hal::SteadyClock clock;
     for (int k = 0; k < 2000; ++k) {
       if (condition()) return true;
-      std::this_thread::sleep_for(1ms);
+      clock.sleep_until(clock.now() + 1ms);
     }
     return false;
   };

@@ -111,7 +111,8 @@ TEST_CASE("a start off the plate is said so at once") {
   const Walk walk = walk_round(tracker, world, {.centre = {900, 20, 5}, .head_yaw = 0});
   CHECK(walk.last.to == TrackState::failed);
   CHECK(walk.shots == 1);
-  CHECK(std::string{walk.last.text.view()} == "no plate under the scanner at x 900 y 20 mm: move [start] onto the plate");
+  CHECK(std::string{walk.last.text.view()} ==
+        "no plate under the scanner at x 900 y 20 mm: move [start] onto the plate");
 }
 
 TEST_CASE("a plate without an end within the seek limit is said so") {

@@ -60,9 +60,13 @@ inline Walk walk_round(BoundaryTracker& tracker, const FlatWorld& world, const S
     const bool seeking = tracker.state() == TrackState::seek_edge;
     const bool found = view.look(frame, motion.inverse() * tracker.plate_hint(), seeking ? 60 : 18);
     // Without a table height to tell them apart the higher of the two levels is the plate.
+    const double table_z = world.table_z + 1 - place.centre.z();
     const bool on_plate = found && !view.runs().empty() &&
-                          frame.z[view.runs().front().first + view.runs().front().stripe * 500u] > world.table_z + 1 - place.centre.z();
-    walk.last = tracker.take({.world_from_scanner = motion, .plate_found = on_plate, .plate_z_mm = world.plate_z, .view = view.boundary()});
+                          frame.z[view.runs().front().first + view.runs().front().stripe * 500u] > table_z;
+    walk.last = tracker.take({.world_from_scanner = motion,
+                              .plate_found = on_plate,
+                              .plate_z_mm = world.plate_z,
+                              .view = view.boundary()});
     walk.turns += walk.last.action == TrackAction::turn;
     if (!walk.last.next) break;
     place = *walk.last.next;

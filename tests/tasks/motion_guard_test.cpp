@@ -9,7 +9,12 @@ using namespace moldloft;
 using namespace moldloft::tasks;
 
 namespace {
-const Workspace cell{.x_mm = {-800, 800}, .y_mm = {-800, 800}, .z_mm = {200, 500}, .reach_mm = {250, 800}, .max_step_mm = 600, .max_speed_percent = 80};
+const Workspace cell{.x_mm = {-800, 800},
+                     .y_mm = {-800, 800},
+                     .z_mm = {200, 500},
+                     .reach_mm = {250, 800},
+                     .max_step_mm = 600,
+                     .max_speed_percent = 80};
 const hal::Pose standing{.x_mm = 500, .z_mm = 300};
 
 std::string refusal(const hal::Pose& target, int speed = 50) {

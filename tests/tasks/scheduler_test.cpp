@@ -134,7 +134,8 @@ TEST_CASE("a step that overruns its quantum is charged by its peak from then on"
   scheduler.add_background({.name = "fit", .quantum = 200us}, fit);
   scheduler.start();
   scheduler.run_until(2ms);
-  CHECK(fit.starts == Instants{0us, 400us, 1000us, 1400us});  // at 800 us its peak of 400 us no longer fits before 900 us
+  // At 800 us its peak of 400 us no longer fits before 900 us.
+  CHECK(fit.starts == Instants{0us, 400us, 1000us, 1400us});
   CHECK(scheduler.background()[0].overruns == 4);
 }
 

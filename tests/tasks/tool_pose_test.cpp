@@ -30,7 +30,8 @@ TEST_CASE("the tip pose brings the field's centre to its place, for every turn o
 }
 
 TEST_CASE("the scanner looks down on the plate with its z axis up") {
-  const auto world_from_scanner = motion_of(tip_pose_for({.centre = {400, 0, 0}, .head_yaw = 0.3}, mount(0))) * mount(0);
+  const auto world_from_scanner =
+      motion_of(tip_pose_for({.centre = {400, 0, 0}, .head_yaw = 0.3}, mount(0))) * mount(0);
   CHECK((world_from_scanner.linear().col(2) - Eigen::Vector3d::UnitZ()).norm() < 1e-9);
 }
 
