@@ -191,6 +191,21 @@ Findings name_findings(std::string_view path) {
   return {};
 }
 
+// CMake splits a list at semicolons: ctest would look for two halves of a name, run no case, and call it passed.
+Findings test_name_findings(std::string_view path, std::string_view text) {
+  Findings findings;
+  if (!path.starts_with("tests/") || !is_source(path)) return findings;
+  static const std::regex name{R"(^TEST_CASE\(\s*((?:"(?:[^"\\\n]|\\.)*"\s*)+))", std::regex::multiline};
+  const std::string code = without_comments(text);
+  for (std::sregex_iterator it{code.begin(), code.end(), name}, end; it != end; ++it) {
+    if (it->str(1).find(';') == std::string::npos) continue;
+    const auto line = std::count(code.begin(), code.begin() + it->position(0), '\n') + 1;
+    findings.push_back(at_line(path, static_cast<std::size_t>(line)) +
+                       "a semicolon in a test's name: ctest would never run it");
+  }
+  return findings;
+}
+
 Findings top_level_findings(std::span<const std::string> paths) {
   std::set<std::string> folders;
   for (const auto& path : paths) {
@@ -226,6 +241,7 @@ Findings file_findings(std::string_view path, std::string_view text) {
   append(all, width_findings(path, text));
   append(all, pragma_findings(path, text));
   append(all, name_findings(path));
+  append(all, test_name_findings(path, text));
   return all;
 }
 
