@@ -4,6 +4,7 @@
 
 #include <array>
 #include <fstream>
+#include <map>
 #include <numbers>
 #include <sstream>
 
@@ -115,7 +116,39 @@ void read_rest(TomlSection& file, CellConfig& c) {
   fit.finish();
 }
 
+// Every key with its value as text, "scanner.mount.zyz_deg" -> "[ 0, 180, 180 ]".
+void flatten(const toml::table& table, const std::string& prefix, std::map<std::string, std::string>& into) {
+  for (const auto& [key, value] : table) {
+    const std::string name = prefix + std::string{key.str()};
+    if (const auto* inner = value.as_table()) {
+      flatten(*inner, name + ".", into);
+      continue;
+    }
+    std::ostringstream text;
+    value.visit([&](const auto& node) { text << node; });
+    into[name] = text.str();
+  }
+}
+
 }  // namespace
+
+std::string first_difference(const std::string& text, const std::string& other) {
+  std::map<std::string, std::string> a, b;
+  flatten(toml::parse(text), "", a);
+  flatten(toml::parse(other), "", b);
+  for (auto* keys : {&a, &b}) {
+    for (const char* addressed : {"cell.name", "cell.device_timeout_s", "scanner.host", "scanner.port", "robot.device", "robot.baud"}) {
+      keys->erase(addressed);
+    }
+  }
+  for (const auto& [key, value] : a) {
+    if (const auto same = b.find(key); same == b.end() || same->second != value) return key;
+  }
+  for (const auto& [key, value] : b) {
+    if (!a.contains(key)) return key;
+  }
+  return {};
+}
 
 CellConfig default_config() {
   CellConfig c;

@@ -67,4 +67,8 @@ CellConfig default_config();
 std::expected<CellConfig, ConfigError> load_config(const std::string& path);
 std::expected<CellConfig, ConfigError> parse_config(const std::string& text, const std::string& path);
 
+// The first key whose value differs between two configurations and would make a run measure differently ("start.yaw_deg");
+// empty when there is none. Where the devices are found, names and comments make no difference.
+std::string first_difference(const std::string& text, const std::string& other);
+
 }  // namespace moldloft::firmware_like

@@ -73,13 +73,16 @@ bool Controller::at_rest() const {
     case tasks::CellState::complete:
     case tasks::CellState::stopped:
     case tasks::CellState::aborted: return true;
-    case tasks::CellState::held: return cell_.cause() == tasks::HoldCause::person;
+    case tasks::CellState::held:
+      return cell_.cause() == tasks::HoldCause::person || cell_.cause() == tasks::HoldCause::measurement;
     default: return false;
   }
 }
 
 void Controller::watch_health(hal::Instant) {
-  if (scheduler_.misses_in_a_row() > max_misses_in_a_row) cell_.command(tasks::CellEvent::abort);
+  if (scheduler_.misses_in_a_row() <= max_misses_in_a_row) return;
+  cell_.abort(hal::Message::format("{} ticks in a row came too late (last cause: {}): give the controller a core of its own",
+                                   scheduler_.misses_in_a_row(), scheduler_.name_of(scheduler_.last_miss_cause())));
 }
 
 MemoryPlan Controller::memory() const {

@@ -21,12 +21,14 @@ std::string progress_line(const tasks::CellProgress& p) {
   if (p.surface_planned > 0) line += fmt::format("  surface {:>3}/{}", p.surface_shots, p.surface_planned);
   if (p.retaken > 0) line += fmt::format("  retaken {}", p.retaken);
   if (p.time_left >= hal::Duration{0}) line += fmt::format("  left {:.0f} s", std::chrono::duration<double>(p.time_left).count());
-  if (!p.why.empty()) line += fmt::format("  {}", p.why.view());
+  // What ends the run is said once, by its last line; what only holds it up is said here.
+  const bool goes_on_by_itself = p.cause == tasks::HoldCause::scanner || p.cause == tasks::HoldCause::recorder;
+  if (!p.why.empty() && goes_on_by_itself) line += fmt::format("  {}", p.why.view());
   return line;
 }
 
-DisplayThread::DisplayThread(const tasks::Cell& cell)
-    : cell_{cell}, terminal_{isatty(STDERR_FILENO) != 0}, thread_{[this] { work(); }} {}
+DisplayThread::DisplayThread(const tasks::Cell& cell, std::string head)
+    : cell_{cell}, terminal_{isatty(STDERR_FILENO) != 0}, head_{std::move(head)}, thread_{[this] { work(); }} {}
 
 DisplayThread::~DisplayThread() {
   ending_ = true;
@@ -39,10 +41,14 @@ void DisplayThread::work() {
     clock_.sleep_until(clock_.now() + display_period);
   }
   show(cell_.progress());
-  if (terminal_) std::fputc('\n', stderr);
+  if (terminal_) fmt::print(stderr, "{}", begun_ ? "\n" : "\r\x1b[K");
 }
 
 void DisplayThread::show(const tasks::CellProgress& p) {
+  if (!begun_ && p.phase != tasks::Phase::none) {
+    begun_ = true;
+    fmt::print(stderr, "{}{}\n", terminal_ ? "\r\x1b[K" : "", head_);
+  }
   const std::string line = progress_line(p);
   if (terminal_) {
     fmt::print(stderr, "\r\x1b[K{}", line);
@@ -52,7 +58,7 @@ void DisplayThread::show(const tasks::CellProgress& p) {
   // Everything but the clock: a log gets a line when something has happened.
   std::string content = line.substr(line.find('s') + 1);
   if (const auto left = content.find("  left"); left != std::string::npos) content.resize(left);
-  if (content == last_) return;
+  if (!begun_ || content == last_) return;
   last_ = content;
   fmt::print(stderr, "{}\n", line);
 }

@@ -1,5 +1,6 @@
 // Progress for a person: one line that renews itself on a terminal, one line a change where the output is a file.
-// progress_line() is pure; DisplayThread is the ordinary thread that prints it.
+// progress_line() is pure; DisplayThread is the ordinary thread that prints it. A run that ends before it has begun to
+// measure leaves nothing behind here: the one line that says why stands alone.
 #pragma once
 
 #include <atomic>
@@ -15,7 +16,7 @@ std::string progress_line(const tasks::CellProgress&);
 
 class DisplayThread {
  public:
-  explicit DisplayThread(const tasks::Cell&);
+  DisplayThread(const tasks::Cell&, std::string head);  // `head` is printed once when the cell begins to measure
   ~DisplayThread();
   DisplayThread(const DisplayThread&) = delete;
   DisplayThread& operator=(const DisplayThread&) = delete;
@@ -25,7 +26,8 @@ class DisplayThread {
   void show(const tasks::CellProgress&);
   const tasks::Cell& cell_;
   hal::SteadyClock clock_;
-  bool terminal_;
+  bool terminal_, begun_ = false;
+  std::string head_;
   std::string last_;
   std::atomic<bool> ending_{false};
   std::thread thread_;

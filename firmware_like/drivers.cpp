@@ -20,7 +20,9 @@ std::unique_ptr<hal::Scanner> make_scanner(const ScannerConfig& config, hal::Byt
 }
 
 std::unique_ptr<hal::Robot> make_robot(const RobotConfig& config, hal::ByteLink& link) {
-  if (config.driver == "line") return std::make_unique<hal::LineRobot>(link, hal::LineRobot::Settings{});
+  if (config.driver == "line") {
+    return std::make_unique<hal::LineRobot>(link, hal::LineRobot::Settings{.baud = config.baud});
+  }
   assert(!"the configuration admits only known drivers");
   return nullptr;
 }

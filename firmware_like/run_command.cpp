@@ -43,20 +43,30 @@ class InterruptGuard {
   }
 };
 
-void print_memory_plan(const Controller& controller) {
-  fmt::print(stderr, "memory plan:");
-  for (const auto& item : controller.memory()) fmt::print(stderr, " {} {:.1f} MiB,", item.subsystem, static_cast<double>(item.plan_bytes) / (1 << 20));
-  fmt::print(stderr, " {:.1f} MiB in all\n", static_cast<double>(total_plan(controller.memory())) / (1 << 20));
+std::string memory_line(const Controller& controller) {
+  std::string line = "memory plan:";
+  for (const auto& item : controller.memory()) line += fmt::format(" {} {:.1f} MiB,", item.subsystem, static_cast<double>(item.plan_bytes) / (1 << 20));
+  return line + fmt::format(" {:.1f} MiB in all", static_cast<double>(total_plan(controller.memory())) / (1 << 20));
 }
 
-std::string how_to_go_on(const Controller& controller, const RunOptions& options, const std::string& folder) {
-  const std::string resume = fmt::format("moldloft run {} --out {} --resume", options.config_path, folder);
-  const auto why = controller.cell().why().view();
-  switch (controller.cell().state()) {
-    case tasks::CellState::held: return fmt::format("held: {}\nEverything so far is saved; when that is mended: {}", why, resume);
-    case tasks::CellState::aborted: return fmt::format("aborted: {}\nEverything so far is saved; when the cell is clear: {}", why, resume);
-    default: return fmt::format("stopped; the arm stands and everything so far is saved. To go on: {}", resume);
+// One line for a run that did not complete: what happened, what is saved where, how to go on.
+std::string how_it_ended(const Controller& controller, const RunOptions& options, const std::string& folder) {
+  const auto& cell = controller.cell();
+  const std::string state = cell.state() == tasks::CellState::held      ? "held: "
+                            : cell.state() == tasks::CellState::aborted ? "aborted: "
+                                                                        : "stopped: ";
+  const std::string what = state + (cell.state() == tasks::CellState::stopped ? "the arm stands" : std::string{cell.why().view()});
+  if (cell.cause() == tasks::HoldCause::measurement && cell.state() != tasks::CellState::stopped) {
+    return fmt::format("{}. What was measured is saved in {} (overview.svg shows it); then begin a new run", what, folder);
   }
+  return fmt::format("{}. Everything so far is saved; to go on: moldloft run {} --out {} --resume", what, options.config_path, folder);
+}
+
+// The same for a run that ended before the arm was sent anywhere: nothing was measured, nothing is kept.
+std::string why_refused(const Controller& controller) {
+  const auto& cell = controller.cell();
+  if (cell.state() == tasks::CellState::stopped) return "stopped before anything was measured; nothing is kept";
+  return fmt::format("{}; nothing was measured", cell.why().view());
 }
 
 // Wire ids of this run must differ from those of any run before on the same scanner.
@@ -118,22 +128,26 @@ int run_cell(const RunOptions& options) {
   const auto robot_link = hal::make_serial_link(config->robot.device, config->robot.baud);
   const auto controller = std::make_unique<Controller>(*config, clock, *scanner_link, *robot_link,
                                                        ControllerOptions{.archive = folder->archive.get(), .epoch = fresh_epoch()});
-  print_memory_plan(*controller);
   {
     const InterruptGuard guard{controller->cell()};
     const RecorderThread recorder{controller->recorder(), *folder->store};
-    const DisplayThread display{controller->cell()};
+    const DisplayThread display{controller->cell(), memory_line(*controller)};
     controller->start();
     while (controller->tick()) {
     }
   }
+  const int code = exit_code(*controller);
+  if (!options.resume && !controller->cell().has_driven()) {
+    discard_run(std::move(*folder));
+    return complain(why_refused(*controller)), code == exit_aborted ? exit_failed : code;
+  }
   const RunLabel label{.plate = config->name, .seed = {}};
   const Json summary = summary_of(*controller, label);
+  if (controller->recorder().store_failed()) complain(fmt::format("{}; what came after that is not saved", controller->recorder().store_error().view()));
   if (const auto written = write_results(*controller, *folder, label, summary); !written) return complain(written.error().what);
+  if (code != exit_done) return complain(how_it_ended(*controller, options, out.string())), code;
   fmt::print("{}", result_table(summary, out.string()));
-  const int code = exit_code(*controller);
-  if (code != exit_done) fmt::print(stderr, "moldloft: {}\n", how_to_go_on(*controller, options, out.string()));
-  return code;
+  return controller->recorder().store_failed() ? exit_failed : exit_done;
 }
 
 int fit_run(const FitOptions& options) {
@@ -154,12 +168,16 @@ int fit_run(const FitOptions& options) {
   const RunLabel label{.plate = config->name, .seed = {}};
   const Json summary = summary_of(*controller, label);
   std::error_code failed;
+  if (std::filesystem::equivalent(options.run, options.out, failed)) {
+    return complain(fmt::format("{}: is the run itself; give another folder with --out", options.out));
+  }
+  failed.clear();
   std::filesystem::create_directories(options.out, failed);
   if (failed) return complain(fmt::format("{}: cannot be created ({})", options.out, failed.message()));
   RunFolder results{options.out, std::move(run->store), nullptr};
   if (const auto written = write_results(*controller, results, label, summary); !written) return complain(written.error().what);
+  if (const int code = exit_code(*controller); code != exit_done) return complain(controller->cell().why().view()), code;
   fmt::print("{}", result_table(summary, options.out));
-  if (exit_code(*controller) != exit_done) return complain(controller->cell().why().view()), exit_code(*controller);
   return exit_done;
 }
 

@@ -5,6 +5,8 @@
 
 #include <ctime>
 
+#include "firmware_like/config.hpp"
+
 namespace moldloft::firmware_like {
 namespace {
 
@@ -16,14 +18,18 @@ fs::path store_path(const fs::path& folder) { return folder / "run.db"; }
 
 std::string kind_name(RunKind kind) { return kind == RunKind::simulated ? "simulated" : "measured"; }
 
+void remove_store(const fs::path& folder) {
+  std::error_code failed;
+  for (const char* file : {"run.db", "run.db-wal", "run.db-shm"}) fs::remove(folder / file, failed);
+}
+
 std::expected<void, RunError> remove_simulated(const fs::path& folder) {
   const auto store = hal::RunStore::open(store_path(folder), hal::RunStore::Mode::read);
   const auto kind = store ? store->meta("kind") : std::expected<std::string, hal::StoreError>{""};
   if (!kind || *kind != kind_name(RunKind::simulated)) {
     return error(fmt::format("{}: holds a run already; give another --out", folder.string()));
   }
-  std::error_code failed;
-  for (const char* file : {"run.db", "run.db-wal", "run.db-shm"}) fs::remove(folder / file, failed);
+  remove_store(folder);
   return {};
 }
 
@@ -31,7 +37,7 @@ std::expected<void, RunError> remove_simulated(const fs::path& folder) {
 
 std::expected<RunFolder, RunError> create_run(const fs::path& path, const std::string& config_text, RunKind kind) {
   std::error_code failed;
-  fs::create_directories(path, failed);
+  const bool made_folder = fs::create_directories(path, failed);
   if (failed) return error(fmt::format("{}: cannot be created ({}); give another --out", path.string(), failed.message()));
   if (fs::exists(store_path(path))) {
     if (kind != RunKind::simulated) {
@@ -44,16 +50,26 @@ std::expected<RunFolder, RunError> create_run(const fs::path& path, const std::s
   for (const auto& [key, value] : {std::pair<std::string, std::string>{"kind", kind_name(kind)}, {"config", config_text}}) {
     if (auto written = store->set_meta(key, value); !written) return error(written.error().what);
   }
-  return RunFolder{path, std::make_unique<hal::RunStore>(std::move(*store)), nullptr};
+  return RunFolder{path, std::make_unique<hal::RunStore>(std::move(*store)), nullptr, made_folder};
+}
+
+void discard_run(RunFolder run) {
+  run.store.reset();  // closes the file
+  remove_store(run.path);
+  std::error_code not_empty;
+  if (run.made_folder) fs::remove(run.path, not_empty);
 }
 
 std::expected<RunFolder, RunError> resume_run(const fs::path& path, const std::string& config_text) {
   auto opened = open_run(path);
   if (!opened) return opened;
   const auto config = opened->store->meta("config");
-  if (config && *config != config_text) {
-    return error(fmt::format("{}: was begun with another configuration; resume it with that one (meta 'config' in run.db)",
-                             path.string()));
+  if (!config) return error(config.error().what);
+  // The stored shots lead to the same places only if everything that places are computed from is as it was.
+  if (const std::string key = first_difference(*config, config_text); !key.empty()) {
+    return error(fmt::format("{}: was begun with another configuration ('{}' differs); resume it with the same, or begin a new run with "
+                             "another --out",
+                             path.string(), key));
   }
   auto store = hal::RunStore::open(store_path(path), hal::RunStore::Mode::append);
   if (!store) return error(store.error().what);

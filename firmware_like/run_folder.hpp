@@ -23,6 +23,7 @@ struct RunFolder {
   std::filesystem::path path;
   std::unique_ptr<hal::RunStore> store;
   std::unique_ptr<StoredShots> archive;  // resumed: the shots that are there already
+  bool made_folder = false;              // it was not there before
 };
 
 enum class RunKind { measured, simulated };
@@ -30,6 +31,10 @@ enum class RunKind { measured, simulated };
 std::expected<RunFolder, RunError> create_run(const std::filesystem::path&, const std::string& config_text, RunKind);
 std::expected<RunFolder, RunError> resume_run(const std::filesystem::path&, const std::string& config_text);
 std::expected<RunFolder, RunError> open_run(const std::filesystem::path&);  // to read only
+
+// Takes a run away that was refused before anything was measured, so that it does not block the next try: its store, and
+// the folder if it was made for it and holds nothing else.
+void discard_run(RunFolder);
 
 std::filesystem::path default_run_path();  // out/run-YYYYmmdd-HHMMSS
 

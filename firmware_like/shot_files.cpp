@@ -1,5 +1,7 @@
 #include "firmware_like/shot_files.hpp"
 
+#include <algorithm>
+
 namespace moldloft::firmware_like {
 
 std::expected<StoredShots, hal::StoreError> StoredShots::load(const hal::RunStore& store) {
@@ -10,6 +12,7 @@ std::expected<StoredShots, hal::StoreError> StoredShots::load(const hal::RunStor
     auto frame = store.frame(record);
     if (!frame) return std::unexpected{frame.error()};
     loaded.frames_.push_back(std::make_unique<hal::Frame>(std::move(*frame)));
+    loaded.last_epoch_ = std::max(loaded.last_epoch_, record.shot_id >> tasks::shot_number_bits);
     loaded.shots_[tasks::shot_number_of(record.shot_id)] = {loaded.frames_.back().get(), record};
   }
   return loaded;

@@ -42,14 +42,17 @@ int cell_command(SimulatedRunOptions& options) {
     };
   }
   const auto run = simulate(options);
-  if (terminal) fmt::print(stderr, "\n");
+  if (terminal && run) fmt::print(stderr, "\n");
   if (!run) {
     fmt::print(stderr, "moldloft-sim cell: {}\n", run.error().what);
     return 1;
   }
+  if (run->exit_code != 0) {
+    fmt::print(stderr, "moldloft-sim cell: {}: {}\n", run->summary["result"].get<std::string>(), run->summary["message"].get<std::string>());
+    return run->exit_code;
+  }
   fmt::print("{}", moldloft::firmware_like::result_table(run->summary, options.out.string()));
-  if (run->exit_code != 0) fmt::print(stderr, "moldloft-sim cell: {}\n", run->summary["message"].get<std::string>());
-  return run->exit_code;
+  return 0;
 }
 
 void add_cell_command(CLI::App& app, SimulatedRunOptions& options) {

@@ -64,14 +64,20 @@ firmware_like::PlateField error_field(const Verdict& verdict, const geometry::BS
   return field;
 }
 
-void run_to_rest(Controller& controller, hal::RunStore& store, hal::Clock& clock, const SimulatedRunOptions& options) {
+void run_to_rest(Controller& controller, const SimulatedCell& cell, hal::Clock& clock, const SimulatedRunOptions& options) {
   controller.start();
   for (int ticks = 1; controller.tick() && clock.now() < options.time_limit; ++ticks) {
-    if (ticks % ticks_between_drains == 0) controller.recorder().drain(store);
+    if (options.on_tick) options.on_tick(cell, clock.now());
+    if (ticks % ticks_between_drains == 0) controller.recorder().drain(cell.store);
     if (options.on_progress && ticks % ticks_between_reports == 0) options.on_progress(controller.cell().progress());
   }
-  controller.recorder().drain(store);
+  controller.recorder().drain(cell.store);
   if (options.on_progress) options.on_progress(controller.cell().progress());
+}
+
+std::expected<firmware_like::RunFolder, firmware_like::RunError> folder_for(const SimulatedRunOptions& options, const std::string& text) {
+  return options.resume ? firmware_like::resume_run(options.out, text)
+                        : firmware_like::create_run(options.out, text, firmware_like::RunKind::simulated);
 }
 
 }  // namespace
@@ -79,10 +85,10 @@ void run_to_rest(Controller& controller, hal::RunStore& store, hal::Clock& clock
 std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& options) {
   const auto plate = placed_plate(options.cell);
   if (!plate) return std::unexpected{plate.error()};
-  const std::string text = cell_toml(options.cell, *plate);
+  const std::string text = options.config.empty() ? cell_toml(options.cell, *plate) : options.config;
   const auto config = firmware_like::parse_config(text, "simulated cell");
   if (!config) return std::unexpected{SimError{config.error().what}};
-  auto folder = firmware_like::create_run(options.out, text, firmware_like::RunKind::simulated);
+  auto folder = folder_for(options, text);
   if (!folder) return std::unexpected{SimError{folder.error().what}};
 
   WorldClock clock;
@@ -90,11 +96,18 @@ std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& option
   SimulatedWorld world{options.cell, *plate, scanner_cable.device(), robot_cable.device()};
   clock.carry(world);
   if (options.real_time) clock.pace_by_wall();
-  const auto controller = std::make_unique<Controller>(*config, clock, scanner_cable.host(), robot_cable.host());
-  run_to_rest(*controller, *folder->store, clock, options);
+  const auto controller = std::make_unique<Controller>(
+      *config, clock, scanner_cable.host(), robot_cable.host(),
+      firmware_like::ControllerOptions{.archive = folder->archive.get(), .epoch = options.resume ? folder->archive->last_epoch() + 1 : 1});
+  run_to_rest(*controller, {world, scanner_cable, robot_cable, *controller, *folder->store}, clock, options);
 
   const firmware_like::RunLabel label{.plate = plate->plate->name(), .seed = options.cell.seed};
   SimulatedRun run{.summary = summary_of(*controller, label), .exit_code = firmware_like::exit_code(*controller)};
+  if (controller->recorder().store_failed()) return std::unexpected{SimError{std::string{controller->recorder().store_error().view()}}};
+  if (!options.resume && !controller->cell().has_driven()) {
+    firmware_like::discard_run(std::move(*folder));
+    return run;
+  }
   std::optional<firmware_like::PlateField> errors;
   if (controller->cell().state() == tasks::CellState::complete) {
     const auto verdict = judge(*plate, controller->surface().fit().surface(), controller->surface().outline().corners);

@@ -11,17 +11,31 @@
 #include <optional>
 
 #include "firmware_like/results.hpp"
+#include "hal/cable.hpp"
 #include "host_sim/judge.hpp"
 #include "host_sim/world.hpp"
 
 namespace moldloft::host_sim {
 
+// What a scripted run may lay its hands on between two ticks: the devices behind their cables, the cables themselves, and
+// the controller, to look at or to command.
+struct SimulatedCell {
+  SimulatedWorld& world;
+  hal::Cable& scanner_cable;
+  hal::Cable& robot_cable;
+  firmware_like::Controller& controller;
+  hal::RunStore& store;
+};
+
 struct SimulatedRunOptions {
   CellDescription cell;
   std::filesystem::path out;
+  std::string config;            // the controller's cell.toml; empty: the one that fits the cell
+  bool resume = false;           // goes on with the run in `out`
   bool write_everything = true;  // false: run.db and no other file; for campaigns that look at the summary only
   bool real_time = false;        // paced by the wall clock instead of as fast as it goes
-  std::function<void(const tasks::CellProgress&)> on_progress;  // now and then, for a terminal
+  std::function<void(const tasks::CellProgress&)> on_progress;         // now and then, for a terminal
+  std::function<void(const SimulatedCell&, hal::Instant)> on_tick;     // after every tick: faults come from here
   hal::Duration time_limit = std::chrono::hours{2};  // of cell time: a run that never rests is a defect, and ends here
 };
 

@@ -192,12 +192,15 @@ ShotPlace BoundaryTracker::carry_out(TrackAction action, const Piece& piece) {
         move_front(piece);
         next.centre = front_;
       }
-      // What hides does so because it runs along the stripes; cross it and the side that was seen equally well. A
-      // second turn in the same place takes the perpendicular, in case the guess was wrong.
-      next.head_yaw = counts_.turns == 1
-                          ? nearest_half_turn(yaw_crossing_both(angle_of(heading_), stripe), place_.head_yaw)
-                          : nearest_half_turn(place_.head_yaw + pi / 3, place_.head_yaw);
-      if (!following) return next;  // the same place, and the plate was found from the same hint
+      if (!following) {
+        // The same place, and the plate was found from the same hint. Whatever hides runs along the stripes.
+        next.head_yaw += settings_.crossing;
+        return next;
+      }
+      // What hides runs along the stripes: cross it and the side that was seen equally well. Should that show nothing
+      // either, the guess was wrong, and a third of a turn looks from elsewhere.
+      next.head_yaw = nearest_half_turn(counts_.turns == 1 ? yaw_crossing_both(angle_of(heading_), stripe) : place_.head_yaw + pi / 3,
+                                        place_.head_yaw);
       break;
     }
     case TrackAction::back_up:

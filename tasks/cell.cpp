@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
+#include <numbers>
 
 #include "tasks/tool_pose.hpp"
 
@@ -41,6 +43,8 @@ void Cell::run(Instant now) {
     const auto event = static_cast<CellEvent>(first);
     if (event == CellEvent::hold) {
       hold(HoldCause::person, "held by command: send unhold to go on");
+    } else if (event == CellEvent::abort) {
+      abort("aborted by command: clear when the cell is safe");
     } else {
       apply(event);
     }
@@ -93,16 +97,23 @@ void Cell::enter(CellAction action) {
 }
 
 void Cell::hold(HoldCause cause, const hal::Message& why) {
+  // A frame that arrives while the cell holds for a device may show what needs a person: that must not get lost.
+  const bool holds = state_ == CellState::holding || state_ == CellState::held;
+  if (holds && cause > cause_) {
+    cause_ = cause;
+    why_ = why;
+    record("cell", "hold", to_string(state_), to_string(state_), why);
+  }
   if (state_ != CellState::execute && state_ != CellState::unholding) return;
   cause_ = cause;
   why_ = why;
   apply(CellEvent::hold, why);
 }
 
-void Cell::abort(const hal::Message& why) {
+void Cell::abort(const hal::Message& why, HoldCause cause) {
   if (state_ == CellState::aborting || state_ == CellState::aborted) return;
   why_ = why;
-  cause_ = HoldCause::person;
+  cause_ = cause;
   apply(CellEvent::abort, why);
 }
 
@@ -125,6 +136,8 @@ void Cell::on_robot(const hal::RobotEvent& event) {
       break;
     case Kind::refused:
       record("robot", "refused", "", "", event.text);
+      // The motion that a stop has ended answers with a refusal too: nothing may be sent after it.
+      if (state_ == CellState::stopping || state_ == CellState::aborting) break;
       if (state_ == CellState::starting) {
         abort(event.text);
       } else if (!arm_.turned_half) {
@@ -133,12 +146,14 @@ void Cell::on_robot(const hal::RobotEvent& event) {
         arm_.place.head_yaw = geometry::wrapped_angle(arm_.place.head_yaw + std::numbers::pi);
         arm_.commanded = tip_pose_for(arm_.place, settings_.tip_from_scanner);
         if (const auto no = refuse_target(arm_.commanded, standing_, settings_.speed_percent, settings_.workspace)) {
-          abort(*no);
+          abort(*no, HoldCause::measurement);
         } else if (!robot_.move(arm_.commanded, settings_.speed_percent, now_)) {
           abort("robot refused a target and takes no other: check it and clear");
         }
       } else {
-        abort(event.text);
+        abort(hal::Message::format("{} (shot {} at x {:.0f} y {:.0f} mm)", event.text.view(), arm_.number, arm_.place.centre.x(),
+                                   arm_.place.centre.y()),
+              HoldCause::measurement);
       }
       break;
     case Kind::fault:
@@ -154,7 +169,6 @@ void Cell::on_scanner(const hal::ScannerEvent& event) {
   switch (event.kind) {
     case Kind::ready:
       record("scanner", "ready", "", "");
-      if (state_ == CellState::held && cause_ == HoldCause::scanner) apply(CellEvent::unhold);
       break;
     case Kind::exposed:
       if (shot_state_ == ShotState::exposing && event.shot_id == arm_.shot_id) apply(ShotEvent::exposed);
@@ -181,16 +195,18 @@ void Cell::advance_state() {
     case CellState::starting:
       if (!settings_.devices) return apply(CellEvent::done);
       if (start_step_ == StartStep::devices && devices_ready()) {
+        if (const auto no = refuse_scanner()) return abort(*no);
         start_step_ = StartStep::calibrating;
         if (!calibrated_) robot_.calibrate(now_);
       }
-      if (start_step_ == StartStep::calibrating && calibrated_ && robot_.state() == hal::RobotState::ready) {
+      if (start_step_ == StartStep::calibrating && calibrated_ && devices_ready()) {
         start_step_ = StartStep::done;
         return apply(CellEvent::done);
       }
-      if (start_step_ == StartStep::devices && now_ - entered_ > settings_.device_timeout) {
-        const bool scanner = scanner_.state() == hal::ScannerState::offline || scanner_.state() == hal::ScannerState::greeting;
-        abort(scanner ? hal::Message::format("scanner: {}", scanner_.why()) : hal::Message::format("robot: {}", robot_.why()));
+      // The arm may calibrate as long as it likes; whoever else is not there makes the time run.
+      if (devices_ready() || (scanner_ready() && robot_.state() == hal::RobotState::moving)) entered_ = now_;
+      if (now_ - entered_ > settings_.device_timeout) {
+        abort(scanner_ready() ? hal::Message::format("robot: {}", robot_.why()) : hal::Message::format("scanner: {}", scanner_.why()));
       }
       return;
     case CellState::execute:
@@ -201,6 +217,8 @@ void Cell::advance_state() {
       if (robot_rests()) apply(CellEvent::done);
       return;
     case CellState::held:
+      // Looked at, not waited for: the scanner may have come back while the arm still ended its motion.
+      if (cause_ == HoldCause::scanner && scanner_ready()) apply(CellEvent::unhold);
       if (cause_ == HoldCause::recorder && recorder_.room_for_frame() && !recorder_.store_failed()) apply(CellEvent::unhold);
       return;
     case CellState::unholding:
@@ -229,11 +247,22 @@ void Cell::start_devices() {
   robot_.start(now_);
 }
 
-bool Cell::devices_ready() const {
-  const auto scanner = scanner_.state();
-  return scanner != hal::ScannerState::offline && scanner != hal::ScannerState::greeting &&
-         robot_.state() == hal::RobotState::ready;
+// The memory plan, the tracker's steps and the zig-zag are made for the configured field of view.
+std::optional<hal::Message> Cell::refuse_scanner() const {
+  constexpr double tolerance = 0.01;
+  const auto& info = scanner_.info();
+  const double x = 2 * settings_.tracker.field_half_x_mm, y = 2 * settings_.tracker.field_half_y_mm;
+  if (std::abs(info.field_x_mm - x) <= tolerance * x && std::abs(info.field_y_mm - y) <= tolerance * y) return std::nullopt;
+  return hal::Message::format("scanner reports a field of {:.1f} x {:.1f} mm: correct [scanner] field_mm = [{:.1f}, {:.1f}]",
+                              info.field_x_mm, info.field_y_mm, x, y);
 }
+
+bool Cell::scanner_ready() const {
+  const auto scanner = scanner_.state();
+  return scanner != hal::ScannerState::offline && scanner != hal::ScannerState::greeting;
+}
+
+bool Cell::devices_ready() const { return scanner_ready() && robot_.state() == hal::RobotState::ready; }
 
 // The controller's own account of its cycle: what the arm does and what the scanner does, as far as it can know.
 void Cell::account() {
@@ -264,7 +293,7 @@ void Cell::publish() {
     p.part_done = surface_.progress();
     p.time_left = Duration{0};
   }
-  published_.store(p);
+  published_.set(p);
 }
 
 void Cell::record(std::string_view source, std::string_view event, std::string_view from, std::string_view to,

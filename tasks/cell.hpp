@@ -15,12 +15,12 @@
 #include <span>
 #include <vector>
 
+#include "hal/latest_value.hpp"
 #include "hal/recorder.hpp"
 #include "hal/robot.hpp"
 #include "hal/scanner.hpp"
 #include "tasks/boundary_tracker.hpp"
 #include "tasks/cell_state.hpp"
-#include "tasks/latest.hpp"
 #include "tasks/motion_guard.hpp"
 #include "tasks/scan_plan.hpp"
 #include "tasks/scheduler.hpp"
@@ -48,7 +48,13 @@ struct CellSettings {
   bool devices = true;               // false: only archived shots, nothing moves
 };
 
-enum class HoldCause : std::uint8_t { none, scanner, recorder, person };
+enum class HoldCause : std::uint8_t {
+  none,
+  scanner,      // ends by itself when the scanner is back
+  recorder,     // ends by itself when the disk takes records again
+  person,       // something must be seen to; the run can be resumed then
+  measurement,  // what was measured, planned or configured leads here each time: resuming would only repeat it
+};
 
 struct CellProgress {  // for people; trivially copyable
   CellState state = CellState::idle;
@@ -73,11 +79,13 @@ class Cell final : public Task {
   void run(Instant now) override;
 
   void command(CellEvent);  // an operator's or line controller's command, taken up in the next tick
-  CellProgress progress() const { return published_.load(); }
+  void abort(const hal::Message& why, HoldCause = HoldCause::person);  // on the control thread: what is dangerous
+  CellProgress progress() const { return published_.get(); }
   CellState state() const { return state_; }
   Phase phase() const { return phase_; }
   HoldCause cause() const { return cause_; }
   const hal::Message& why() const { return why_; }
+  bool has_driven() const { return has_driven_; }  // the arm was sent to at least one shot
 
   // ---- results, for reading when the cell has come to rest
   const BoundaryTracker& tracker() const { return tracker_; }
@@ -107,11 +115,12 @@ class Cell final : public Task {
   void apply(CellEvent, const hal::Message& text = {});
   void enter(CellAction);
   void hold(HoldCause, const hal::Message&);
-  void abort(const hal::Message&);
   void on_robot(const hal::RobotEvent&);
   void on_scanner(const hal::ScannerEvent&);
   void advance_state();
   void start_devices();
+  std::optional<hal::Message> refuse_scanner() const;
+  bool scanner_ready() const;
   bool devices_ready() const;
   void account();
   void publish();
@@ -129,6 +138,7 @@ class Cell final : public Task {
   void deliver();
   void give_up(const hal::Message&);
   bool deliver_archived();
+  void skip_given_up();
   bool may_expose() const;
   Eigen::Vector3d hint_in_world(const Order&) const;
 
@@ -158,7 +168,7 @@ class Cell final : public Task {
   hal::Message why_;
   StartStep start_step_ = StartStep::devices;
   bool devices_started_ = false, calibrated_ = false;
-  bool counting_ = false;
+  bool counting_ = false, has_driven_ = false;
 
   ShotState shot_state_ = ShotState::parked;
   std::optional<Order> wanted_;
@@ -176,7 +186,7 @@ class Cell final : public Task {
   std::uint64_t points_seen_ = 0;
   CycleTimes cycle_;
   Histogram frame_to_command_;
-  Latest<CellProgress> published_;
+  hal::LatestValue<CellProgress> published_;
 };
 
 }  // namespace moldloft::tasks

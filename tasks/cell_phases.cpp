@@ -49,8 +49,7 @@ void Cell::measure() {
 void Cell::advance_phase() {
   if (surface_.stage() == Stage::failed && phase_ != Phase::none) {
     const auto reason = geometry::to_string(surface_.error());
-    return hold(HoldCause::person,
-                hal::Message::format("{}: {}; everything is stored, 'moldloft fit' can go on from it", to_string(phase_), reason));
+    return hold(HoldCause::measurement, hal::Message::format("{}: {}", to_string(phase_), reason));
   }
   switch (phase_) {
     case Phase::plan_scan:
@@ -131,7 +130,7 @@ void Cell::use_boundary_shot(const Order& order, const geometry::RigidMotion& wo
   record("tracker", to_string(step.event), to_string(step.from), to_string(step.to),
          hal::Message::format("shot {}: {}", order.number, to_string(step.action)));
   switch (step.to) {
-    case TrackState::failed: return hold(HoldCause::person, step.text);
+    case TrackState::failed: return hold(HoldCause::measurement, step.text);
     case TrackState::closed:
       set_phase(Phase::plan_scan);
       heights_.solve();
@@ -146,7 +145,7 @@ void Cell::plan_surface() {
   const auto& last = boundary_places_.back();
   const auto planned = plan_zigzag(surface_.outline(), heights_, settings_.scan, last.centre.head<2>(), last.head_yaw, surface_places_);
   if (!planned) {
-    return hold(HoldCause::person, "the plate needs more shots than [plate] largest_mm plans for: raise it and run again");
+    return hold(HoldCause::measurement, "the plate needs more shots than [plate] largest_mm plans for: raise it and run again");
   }
   surface_planned_ = *planned;
   surface_next_ = 0;

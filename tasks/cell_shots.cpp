@@ -9,6 +9,26 @@ namespace moldloft::tasks {
 
 using hal::ShotPurpose;
 
+namespace {
+
+// Of the two yaws that look the same, the one at which the pose was commanded: what is planned next depends on it.
+ShotPlace place_commanded(const ShotPlace& wanted, const hal::Pose& commanded, const geometry::RigidMotion& tip_from_scanner) {
+  ShotPlace best = wanted;
+  double least = INFINITY;
+  for (const double half_turn : {0.0, std::numbers::pi}) {
+    ShotPlace place = wanted;
+    place.head_yaw = geometry::wrapped_angle(wanted.head_yaw + half_turn);
+    const auto motion = motion_of(tip_pose_for(place, tip_from_scanner));
+    const double distance = (motion.matrix() - motion_of(commanded).matrix()).norm();
+    if (distance >= least) continue;
+    least = distance;
+    best = place;
+  }
+  return best;
+}
+
+}  // namespace
+
 void Cell::want(const ShotPlace& place, ShotPurpose purpose) {
   Order order;
   order.number = ++last_number_;
@@ -20,10 +40,11 @@ void Cell::want(const ShotPlace& place, ShotPurpose purpose) {
 // Hands the next wanted shot to the arm, and lets the scanner expose when everything is ready for the frame.
 void Cell::sequence() {
   if (wanted_ && (shot_state_ == ShotState::parked || shot_state_ == ShotState::computing)) {
+    skip_given_up();
     if (deliver_archived()) return;
     if (!settings_.devices) {
-      return hold(HoldCause::person, hal::Message::format("the recording ends before shot {}: resume the run on the cell to go on",
-                                                          wanted_->number));
+      return hold(HoldCause::measurement, hal::Message::format("the recording ends before shot {}: resume the run on the cell to go on",
+                                                               wanted_->number));
     }
     if (robot_.state() == hal::RobotState::ready) apply(ShotEvent::order);
   }
@@ -73,6 +94,7 @@ void Cell::drive() {
   if (!robot_.move(arm_.commanded, settings_.speed_percent, now_)) {
     return abort("robot takes no target although it said it was ready: check it and clear");
   }
+  has_driven_ = true;
   if (last_frame_ > Instant{0} && (arm_.purpose != ShotPurpose::surface)) {
     frame_to_command_.add(clock_.now() - last_frame_);
   }
@@ -98,12 +120,16 @@ bool Cell::pick_pose(Order& order) {
     order.place = place;
     order.commanded = pose;
   }
-  if (std::isinf(least_turn)) abort(*no);
+  if (std::isinf(least_turn)) abort(*no, HoldCause::measurement);
   return !std::isinf(least_turn);
 }
 
 void Cell::trigger() {
-  if (++arm_.attempts > 1) ++retaken_;
+  if (++arm_.attempts > 1) {
+    // Given up under its old id, which may be exposed already; the arm has not moved, so a new exposure is as good.
+    ++retaken_;
+    arm_.shot_id = (++epoch_ << shot_number_bits) | arm_.number;
+  }
   scanner_.trigger(arm_.shot_id, now_);
 }
 
@@ -119,7 +145,8 @@ void Cell::give_up(const hal::Message& text) {
   const Order again = order;
   apply(ShotEvent::failed);
   if (!arm_has_gone) return;
-  if (again.purpose == ShotPurpose::surface && surface_planned_ < surface_places_.size()) {
+  if (again.purpose == ShotPurpose::surface) {
+    if (surface_planned_ == surface_places_.size()) return hold(HoldCause::person, text);
     surface_places_[surface_planned_++] = again.place;
     ++retaken_;
     if (!wanted_ && shot_state_ == ShotState::parked) next_surface_shot();
@@ -144,6 +171,18 @@ void Cell::deliver() {
   use_shot(exposed_, frame);
 }
 
+// A surface shot that the archive leaves out before later ones was given up when the run was recorded, and its place was
+// put at the end of the plan (give_up): so it is again, or every later number would stand for another place.
+void Cell::skip_given_up() {
+  while (archive_ != nullptr && wanted_ && wanted_->purpose == ShotPurpose::surface && wanted_->number < archive_->last() &&
+         archive_->find(wanted_->number) == nullptr && surface_planned_ < surface_places_.size()) {
+    surface_places_[surface_planned_++] = wanted_->place;
+    ++retaken_;
+    wanted_.reset();
+    next_surface_shot();
+  }
+}
+
 bool Cell::deliver_archived() {
   const ArchivedShot* shot = archive_ == nullptr ? nullptr : archive_->find(wanted_->number);
   if (shot == nullptr) return false;
@@ -153,7 +192,9 @@ bool Cell::deliver_archived() {
   wanted_.reset();
   exposed_.shot_id = shot->record.shot_id;
   exposed_.commanded = shot->record.commanded;
+  exposed_.place = place_commanded(exposed_.place, exposed_.commanded, settings_.tip_from_scanner);
   exposed_.reported = shot->record.reported;
+  retaken_ += shot->record.attempts - 1;
   record("shot", "archived", "", "");
   if (phase_ == Phase::scan_surface) next_surface_shot();
   last_frame_ = now_;

@@ -7,8 +7,9 @@ namespace {
 
 std::optional<hal::Message> outside(const char* what, double value, const Range& range) {
   if (range.contains(value)) return std::nullopt;
-  return hal::Message::format("target outside the workspace: {} {:.1f} mm, limit {:.1f} to {:.1f} mm", what, value, range.min,
-                              range.max);
+  return hal::Message::format("target outside the workspace: {} {:.1f} mm, limit {:.1f} to {:.1f} mm: move the plate, or widen "
+                              "[robot.workspace] if the arm may go there",
+                              what, value, range.min, range.max);
 }
 
 }  // namespace

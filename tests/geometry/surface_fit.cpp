@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <random>
 #include <string>
 
@@ -226,6 +227,21 @@ TEST_CASE("a height that a coarse net holds exactly is found exactly, and the co
   CHECK(surface_fit.report().spans_u == 4);
   CHECK(surface_fit.report().spans_v == 4);
   CHECK(surface_fit.report().sigma_mm == doctest::Approx(0.05).epsilon(0.02));
+}
+
+TEST_CASE("what a coarser net misses decides against the tolerance which net is taken") {
+  // A ripple of 4 micrometres rms and 40 mm wavelength: 4 spans cannot follow it, 32 can, and the data show it clearly.
+  const PlanMap map(test::straight_outline(square));
+  const Height rippled = [](double x, double) { return 100 + 0.0057 * std::sin(x * 2 * std::numbers::pi / 40); };
+  const auto shots = random_shots(map, rippled, 1, 60'000, 0.02, 0, 5);
+  const auto spans_with = [&](double tolerance_mm) {
+    SurfaceFit surface_fit({.max_spans_u = 32, .max_spans_v = 32, .max_shots = 4, .shot_sigma_mm = 0, .tolerance_mm = tolerance_mm});
+    REQUIRE(fit(surface_fit, map, shots).has_value());
+    return surface_fit.report().spans_u;
+  };
+  CHECK(spans_with(0) >= 16);
+  CHECK(spans_with(0.002) >= 16);
+  CHECK(spans_with(0.006) == 4);
 }
 
 TEST_CASE("x and y of the surface are the plan map's") {

@@ -77,7 +77,32 @@ TEST_CASE("a boundary parallel to the stripes is found by turning the head") {
   const FlatWorld world{.outline = placed(square, 0)};  // stripes along y, the first edge met along x too
   const Walk walk = walk_round(tracker, world, start);
   CHECK(walk.last.to == TrackState::closed);
-  CHECK(walk.turns >= 1);
+  CHECK(walk.turns == 1);  // the first turn crosses both the boundary and where the stripes were
+}
+
+TEST_CASE("where the boundary hides, the head turns so that stripes cross both what was seen and what hides") {
+  BoundaryTracker tracker{TrackerSettings{}};
+  tracker.begin(start);
+  // A straight piece along world +x through the field's middle, made by hand: scanner at yaw 0, stripes along y.
+  std::vector<geometry::EdgePoint> points;
+  for (int i = 0; i < 20; ++i) points.push_back({.position = {2.0 * i - 20, 0, 0}, .stripe = static_cast<std::uint16_t>(i)});
+  geometry::BoundaryPiece piece;
+  piece.count = 20;
+  piece.tangent_first = piece.tangent_last = {1, 0};
+  const auto show = [&] {
+    geometry::BoundaryViewer::View view;
+    view.points = points;
+    view.pieces = {&piece, 1};
+    return tracker.take({.world_from_scanner = geometry::turned_about_z(0, start.centre), .plate_found = true, .plate_z_mm = 6, .view = view});
+  };
+  REQUIRE(show().to == TrackState::first_side);
+  REQUIRE(show().to == TrackState::track);
+  piece.hidden_last = true;
+  const auto step = show();
+  REQUIRE(step.action == TrackAction::turn);
+  const double stripe = step.next->head_yaw + 1.5707963;
+  CHECK(std::abs(std::sin(stripe)) > 0.7);  // across the seen side, which runs along x
+  CHECK(std::abs(std::cos(stripe)) > 0.7);  // across the old stripes, along which the rest hides
 }
 
 TEST_CASE("a start off the plate is said so at once") {

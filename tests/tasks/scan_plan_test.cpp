@@ -73,6 +73,14 @@ TEST_CASE("the fields cover the plate wherever it lies, however it is turned and
   }
 }
 
+TEST_CASE("without any overlap to spare the rows still reach as far as a sheared plate does") {
+  const ScanPlanSettings s{.overlap_mm = 0, .margin_mm = 0};
+  std::array<ShotPlace, 64> places;
+  const auto outline = straight({Vector2d{0, 0}, {180, 0}, {480, 300}, {300, 300}});
+  const std::size_t count = plan_zigzag(outline, {}, s, {0, 0}, 0, places).value();
+  CHECK(covers_all(outline, std::span{places}.first(count), s));
+}
+
 TEST_CASE("the zig-zag begins near the arm and never jumps over a row") {
   const ScanPlanSettings s;
   std::array<ShotPlace, 64> places;

@@ -50,6 +50,17 @@ TEST_CASE("one nanosecond beyond the tolerance is a missed tick") {
   CHECK(scheduler.missed_ticks() == 1);
 }
 
+TEST_CASE("after one missed tick a task of period two still runs at even ticks") {
+  ScriptedClock clock;
+  Scheduler scheduler{clock, every_millisecond()};
+  ScriptedTask task{clock, {150us, 1300us}};
+  scheduler.add({.name = "task", .period_ticks = 2, .budget = 200us}, task);
+  scheduler.start();
+  scheduler.run_until(7ms);
+  CHECK(task.starts == Instants{0ms, 2ms, 4ms, 6ms});  // tick 3 was missed
+  CHECK(scheduler.missed_ticks() == 1);
+}
+
 TEST_CASE("re-anchoring begins the schedule anew where the late tick ended") {
   ScriptedClock clock;
   auto settings = every_millisecond();
@@ -179,6 +190,8 @@ TEST_CASE("the first ticks stay out of the statistics") {
   CHECK(scheduler.tasks()[0].runs == 2);
   CHECK(scheduler.tasks()[0].overruns == 0);
   CHECK(scheduler.tasks()[0].cost.max() == 20us);
+  CHECK(scheduler.slack().count() == 2);
+  CHECK(scheduler.wake_up().count() == 2);
 }
 
 TEST_CASE("the running task can be read from inside it and from outside none runs") {

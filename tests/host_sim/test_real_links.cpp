@@ -1,0 +1,140 @@
+// The programs as they are deployed, in real time: the controller on a TCP socket and a serial port, the simulated devices
+// behind them. Nothing here depends on how fast the machine answers; all waits have a limit.
+#include <doctest/doctest.h>
+
+#include <csignal>
+#include <nlohmann/json.hpp>
+
+#include "firmware_like/run_command.hpp"
+#include "hal/run_store.hpp"
+#include "host_sim/child_process.hpp"
+#include "host_sim/ply_reader.hpp"
+
+using namespace moldloft;
+using namespace moldloft::host_sim;
+using namespace std::chrono_literals;
+using nlohmann::json;
+
+namespace {
+
+constexpr auto run_limit = 90s;  // a run takes 18 s of cell time; the rest is for a machine that does other things too
+
+// The simulated devices, ready to be connected to.
+class Devices {
+ public:
+  explicit Devices(const std::vector<std::string>& more = {}) : child_{words(folder_, more)} {
+    REQUIRE_MESSAGE(child_.prints("ready:", 20s), child_.err());
+  }
+  std::string config() const { return folder_.file("cell.toml"); }
+
+ private:
+  static std::vector<std::string> words(const hal::TemporaryFolder& folder, const std::vector<std::string>& more) {
+    std::vector<std::string> all = {MOLDLOFT_SIM, "devices", "--scanner-port", "0", "--robot-pty", folder.file("robot"),
+                                    "--cell",     folder.file("cell.toml")};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+  hal::TemporaryFolder folder_;
+  ChildProcess child_;
+};
+
+std::vector<std::string> run_words(const Devices& devices, const std::string& out, bool resume = false) {
+  std::vector<std::string> words = {MOLDLOFT, "run", devices.config(), "--out", out};
+  if (resume) words.push_back("--resume");
+  return words;
+}
+
+json summary_in(const std::string& folder) { return json::parse(text_of(folder + "/summary.json")); }
+
+void check_files(const std::string& folder) {
+  const auto summary = summary_in(folder);
+  CHECK(summary["result"] == "complete");
+  CHECK(summary["recorder_lost"] == 0);
+  CHECK(summary["shots"]["surface"] == 16);
+  CHECK(json::parse(text_of(folder + "/surface.json"))["unit"] == "mm");
+  const auto timing = json::parse(text_of(folder + "/timing.json"));
+  CHECK(timing["ticks"].get<int>() > 1000);
+  std::istringstream events{text_of(folder + "/events.jsonl")};
+  int count = 0;
+  for (std::string line; std::getline(events, line); ++count) REQUIRE(json::accept(line));
+  CHECK(count > 100);
+  CHECK(text_of(folder + "/overview.svg").starts_with("<svg"));
+  CHECK(text_of(folder + "/overview.svg").find("</svg>") != std::string::npos);
+  for (const char* ply : {"/points.ply", "/boundary.ply"}) CHECK(text_of(folder + ply).starts_with("ply\nformat binary_little_endian 1.0\n"));
+  const auto store = hal::RunStore::open(folder + "/run.db", hal::RunStore::Mode::read);
+  REQUIRE_MESSAGE(store.has_value(), store.error().what);
+  CHECK(store->shots()->size() ==
+        summary["shots"]["seek"].get<std::size_t>() + summary["shots"]["boundary"].get<std::size_t>() + 16);
+}
+
+void check_truth(const std::string& folder) {
+  const auto judged = run_program({MOLDLOFT_SIM, "judge", folder, "--seed", "1"});
+  CHECK(judged.exit_code == 0);
+  const auto truth = summary_in(folder)["truth"];
+  CHECK(truth["normal_rms_mm"].get<double>() <= 0.02);
+  CHECK(truth["normal_max_mm"].get<double>() <= 0.08);
+  CHECK(truth["outline_max_mm"].get<double>() <= 0.3);
+  CHECK(truth["corner_max_mm"].get<double>() <= 0.3);
+}
+
+std::size_t stored_shots(const std::string& folder) {
+  const auto store = hal::RunStore::open(folder + "/run.db", hal::RunStore::Mode::read);
+  return store ? store->shots()->size() : 0;
+}
+
+// The control points are the same to the last bit: both come from the same bytes in the same order.
+void check_fit_repeats(const std::string& run, const std::string& out) {
+  const auto fitted = run_program({MOLDLOFT, "fit", run, "--out", out});
+  CHECK_MESSAGE(fitted.exit_code == 0, fitted.err);
+  CHECK(text_of(out + "/surface.json") == text_of(run + "/surface.json"));
+  CHECK(summary_in(out)["result"] == "complete");
+}
+
+}  // namespace
+
+TEST_CASE("the deployed program measures a plate over a socket and a serial port, and its run can be fitted again") {
+  const Devices devices;
+  const hal::TemporaryFolder folder;
+  const std::string out = folder.file("run");
+  ChildProcess run{run_words(devices, out), PTY_MODEM};
+  const auto code = run.wait(run_limit);
+  REQUIRE_MESSAGE(code == firmware_like::exit_done, run.err());
+  CHECK(run.out().find("complete") != std::string::npos);
+  check_files(out);
+  check_truth(out);
+  check_fit_repeats(out, folder.file("fit"));
+}
+
+TEST_CASE("a run that ctrl-C stops, then a power cut, goes on where it was with --resume") {
+  const Devices devices;
+  const hal::TemporaryFolder folder;
+  const std::string out = folder.file("run");
+  {
+    ChildProcess run{run_words(devices, out), PTY_MODEM};
+    REQUIRE_MESSAGE(run.prints("boundary shots   5", run_limit), run.err());
+    run.send(SIGINT);
+    CHECK(run.wait(20s) == firmware_like::exit_stopped);
+    CHECK(run.err().find("moldloft: stopped: the arm stands. Everything so far is saved; to go on: moldloft run " + devices.config() +
+                         " --out " + out + " --resume\n") != std::string::npos);
+    CHECK(run.out().empty());  // no table of a run that has no result
+  }
+  const auto shots_at_stop = stored_shots(out);
+  CHECK(shots_at_stop >= 5);
+  CHECK(summary_in(out)["result"] == "stopped");
+  {
+    ChildProcess run{run_words(devices, out, true), PTY_MODEM};
+    REQUIRE_MESSAGE(run.prints("surface   4/16", run_limit), run.err());
+    run.send(SIGKILL);
+    CHECK_FALSE(run.wait(20s).has_value());
+  }
+  const auto shots_at_cut = stored_shots(out);
+  CHECK(shots_at_cut > shots_at_stop);
+  {
+    ChildProcess run{run_words(devices, out, true), PTY_MODEM};
+    const auto code = run.wait(run_limit);
+    REQUIRE_MESSAGE(code == firmware_like::exit_done, run.err());
+  }
+  check_files(out);
+  check_truth(out);
+  check_fit_repeats(out, folder.file("fit"));
+}
