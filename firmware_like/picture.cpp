@@ -46,6 +46,23 @@ std::array<Vector2d, 4> field_corners(const tasks::ShotPlace& place, double widt
   return corners;
 }
 
+std::vector<Vector2d> border_of(const geometry::BSplineSurface& surface) {
+  constexpr int steps = 60;
+  std::vector<Vector2d> border;
+  const auto side = [&](auto uv) {
+    for (int i = 0; i < steps; ++i) {
+      const auto [u, v] = uv(static_cast<double>(i) / steps);
+      const Eigen::Vector3d p = surface.at(u, v).value;
+      border.emplace_back(p.x(), p.y());
+    }
+  };
+  side([](double t) { return std::pair{t, 0.0}; });
+  side([](double t) { return std::pair{1.0, t}; });
+  side([](double t) { return std::pair{1 - t, 1.0}; });
+  side([](double t) { return std::pair{0.0, 1 - t}; });
+  return border;
+}
+
 void extend_by_fields(View& view, std::span<const tasks::ShotPlace> places, const OverviewInput& in) {
   for (const auto& place : places) {
     for (const auto& corner : field_corners(place, in.field_x_mm, in.field_y_mm)) extend(view, corner);
@@ -61,6 +78,9 @@ View view_of(const OverviewInput& in) {
   for (const auto& place : in.boundary_places) extend(view, place.centre.head<2>());
   for (const auto& p : in.edge_points) extend(view, p);
   for (const auto& p : in.corners) extend(view, p);
+  if (in.surface != nullptr) {
+    for (const auto& p : border_of(*in.surface)) extend(view, p);
+  }
   if (!std::isfinite(view.min.x())) view = {.min = {0, 0}, .max = {1, 1}};
   const Vector2d border = Vector2d::Constant(0.02 * (view.max - view.min).maxCoeff());
   view.min -= border;
@@ -234,19 +254,7 @@ std::string overlay(const OverviewInput& in, const View& view, bool numbers) {
 std::string outline(const OverviewInput& in, const View& view) {
   std::string svg;
   if (in.surface != nullptr) {
-    std::vector<Vector2d> border;
-    constexpr int steps = 60;
-    const auto side = [&](auto uv) {
-      for (int i = 0; i < steps; ++i) {
-        const auto [u, v] = uv(static_cast<double>(i) / steps);
-        const Eigen::Vector3d p = in.surface->at(u, v).value;
-        border.emplace_back(p.x(), p.y());
-      }
-    };
-    side([](double t) { return std::pair{t, 0.0}; });
-    side([](double t) { return std::pair{1.0, t}; });
-    side([](double t) { return std::pair{1 - t, 1.0}; });
-    side([](double t) { return std::pair{0.0, 1 - t}; });
+    const auto border = border_of(*in.surface);
     svg += polyline(border, view, "stroke='#111' stroke-width='1.6'", true);
   } else {
     for (const auto& p : in.edge_points) {

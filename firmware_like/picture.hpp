@@ -26,11 +26,11 @@ struct PlateField {
 struct OverviewInput {
   std::string title, subtitle;                        // a path in the title is cut down to the file's name
   const geometry::BSplineSurface* surface = nullptr;  // null: only outline, path and shots
-  std::span<const Eigen::Vector2d> edge_points;
-  std::span<const Eigen::Vector2d> corners;
-  std::span<const tasks::ShotPlace> boundary_places, surface_places;
+  std::span<const Eigen::Vector2d> edge_points{};
+  std::span<const Eigen::Vector2d> corners{};
+  std::span<const tasks::ShotPlace> boundary_places{}, surface_places{};
   double field_x_mm = 102, field_y_mm = 102;
-  std::vector<PlateField> fields;  // one panel each
+  std::vector<PlateField> fields{};  // one panel each
 };
 
 std::string overview_svg(const OverviewInput&);

@@ -2,8 +2,8 @@
 //
 // A tracker looks at one field at a time: a notch, a saw tooth of a torn edge or a tack weld looks like a corner there.
 // Seen from farther away the boundary goes straight on past a false corner and turns at a true one. So each candidate
-// is looked at with the edge points in a ring around it: two branches leave it, each is fitted by a line, the lines give
-// the turn and, where they meet, the corner itself. Candidates that come to lie together are one.
+// is looked at with the edge points in a ring around it: two branches leave it, each is fitted by a line, the lines
+// give the turn and, where they meet, the corner itself. Candidates that come to lie together are one.
 //
 // Frame        plan view, mm
 // Work         step() examines one candidate: one pass over the edge points, about 5 ns a point

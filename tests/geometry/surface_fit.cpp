@@ -235,7 +235,11 @@ TEST_CASE("what a coarser net misses decides against the tolerance which net is 
   const Height rippled = [](double x, double) { return 100 + 0.0057 * std::sin(x * 2 * std::numbers::pi / 40); };
   const auto shots = random_shots(map, rippled, 1, 60'000, 0.02, 0, 5);
   const auto spans_with = [&](double tolerance_mm) {
-    SurfaceFit surface_fit({.max_spans_u = 32, .max_spans_v = 32, .max_shots = 4, .shot_sigma_mm = 0, .tolerance_mm = tolerance_mm});
+    SurfaceFit surface_fit({.max_spans_u = 32,
+                            .max_spans_v = 32,
+                            .max_shots = 4,
+                            .shot_sigma_mm = 0,
+                            .tolerance_mm = tolerance_mm});
     REQUIRE(fit(surface_fit, map, shots).has_value());
     return surface_fit.report().spans_u;
   };

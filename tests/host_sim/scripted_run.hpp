@@ -1,5 +1,6 @@
 // A whole-cell run under virtual time in a folder of its own, watched from the first tick to the last: whatever a test
-// does to the cell, no motion is executed twice, the arm stays inside its limits, no accepted shot and no record is lost.
+// does to the cell, no motion is executed twice, the arm stays inside its limits, no accepted shot and no record is
+// lost.
 #pragma once
 
 #include <doctest/doctest.h>
@@ -76,22 +77,29 @@ class ScriptedRun {
   std::uint64_t motions = 0, exposures = 0, repeats = 0;
 
  private:
-  std::string config() const { return options.config.empty() ? cell_toml(options.cell, *placed_plate(options.cell)) : options.config; }
-  hal::RunStore store() const { return std::move(*hal::RunStore::open(options.out / "run.db", hal::RunStore::Mode::read)); }
+  std::string config() const {
+    return options.config.empty() ? cell_toml(options.cell, *placed_plate(options.cell)) : options.config;
+  }
+  hal::RunStore store() const {
+    return std::move(*hal::RunStore::open(options.out / "run.db", hal::RunStore::Mode::read));
+  }
 
   void watch(const SimulatedCell& cell, hal::Instant now, const tasks::Workspace& limits) {
     most_executions = std::max(most_executions, cell.world.robot().counters().most_executions);
     motions = cell.world.robot().counters().motions;
     exposures = cell.world.scanner().counters().exposures;
     repeats = cell.world.scanner().counters().repeats;
-    // On its way from one pose to the next the arm's tip may leave a box that both ends lie in, so places where it has been
-    // sent are looked at, where it stands.
+    // On its way from one pose to the next the arm's tip may leave a box that both ends lie in, so places where it has
+    // been sent are looked at, where it stands.
     if (now < cell.world.robot().busy_until()) return;
     if (cell.world.robot().counters().motions == 0) return;
     const Eigen::Vector3d tip = cell.world.world_from_tip(now).translation();
     constexpr double arm_error_mm = 0.5;
-    const auto off = [&](double v, const tasks::Range& r) { return v < r.min - arm_error_mm || v > r.max + arm_error_mm; };
-    if (off(tip.x(), limits.x_mm) || off(tip.y(), limits.y_mm) || off(tip.z(), limits.z_mm) || off(tip.head<2>().norm(), limits.reach_mm)) {
+    const auto off = [&](double v, const tasks::Range& r) {
+      return v < r.min - arm_error_mm || v > r.max + arm_error_mm;
+    };
+    if (off(tip.x(), limits.x_mm) || off(tip.y(), limits.y_mm) || off(tip.z(), limits.z_mm) ||
+        off(tip.head<2>().norm(), limits.reach_mm)) {
       ++left_the_limits;
     }
   }

@@ -1,5 +1,5 @@
-// The programs as they are deployed, in real time: the controller on a TCP socket and a serial port, the simulated devices
-// behind them. Nothing here depends on how fast the machine answers; all waits have a limit.
+// The programs as they are deployed, in real time: the controller on a TCP socket and a serial port, the simulated
+// devices behind them. Nothing here depends on how fast the machine answers; all waits have a limit.
 #include <doctest/doctest.h>
 
 #include <csignal>
@@ -60,7 +60,8 @@ void check_files(const std::string& folder) {
   CHECK(count > 100);
   CHECK(text_of(folder + "/overview.svg").starts_with("<svg"));
   CHECK(text_of(folder + "/overview.svg").find("</svg>") != std::string::npos);
-  for (const char* ply : {"/points.ply", "/boundary.ply"}) CHECK(text_of(folder + ply).starts_with("ply\nformat binary_little_endian 1.0\n"));
+  for (const char* ply : {"/points.ply", "/boundary.ply"})
+    CHECK(text_of(folder + ply).starts_with("ply\nformat binary_little_endian 1.0\n"));
   const auto store = hal::RunStore::open(folder + "/run.db", hal::RunStore::Mode::read);
   REQUIRE_MESSAGE(store.has_value(), store.error().what);
   CHECK(store->shots()->size() ==
@@ -114,8 +115,9 @@ TEST_CASE("a run that ctrl-C stops, then a power cut, goes on where it was with 
     REQUIRE_MESSAGE(run.prints("boundary shots   5", run_limit), run.err());
     run.send(SIGINT);
     CHECK(run.wait(20s) == firmware_like::exit_stopped);
-    CHECK(run.err().find("moldloft: stopped: the arm stands. Everything so far is saved; to go on: moldloft run " + devices.config() +
-                         " --out " + out + " --resume\n") != std::string::npos);
+    CHECK(run.err().find(
+              "moldloft: stopped: the arm stands. Everything so far is saved; to go on: moldloft run " +
+              devices.config() + " --out " + out + " --resume\n") != std::string::npos);
     CHECK(run.out().empty());  // no table of a run that has no result
   }
   const auto shots_at_stop = stored_shots(out);

@@ -200,7 +200,7 @@ TEST_CASE("three seconds of silence stop the arm and SYN is needed") {
   CHECK(bench.next()->verb == Verb::ack);
 }
 
-TEST_CASE("SYN does not stop a motion, but its number is forgotten; STP then stops it") {
+TEST_CASE("SYN does not stop a motion, but its number is forgotten, and STP then stops it") {
   Bench bench;
   bench.make_ready();
   bench.move(2, -300, 600, 3);

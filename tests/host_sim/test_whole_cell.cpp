@@ -39,7 +39,8 @@ TEST_CASE("the default run completes, and its summary says everything that it pr
   check_truth(s);
   CHECK(cell.states() == std::vector<std::string>{"Starting", "Execute", "Completing", "Complete"});
   CHECK(Json::parse(cell.file("summary.json")) == s);
-  for (const char* file : {"boundary.ply", "points.ply", "surface.json", "timing.json", "overview.svg", "events.jsonl"}) {
+  for (const char* file :
+       {"boundary.ply", "points.ply", "surface.json", "timing.json", "overview.svg", "events.jsonl"}) {
     CAPTURE(file);
     CHECK(cell.file(file).size() > 100);
   }

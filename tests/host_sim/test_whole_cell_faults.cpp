@@ -76,7 +76,8 @@ TEST_CASE("scanner cable cut while it computes: the cell holds, reconnects, gets
   const auto run = cell.run([&](const SimulatedCell& c, hal::Instant now) {
     if (cut.begins(surface_shots(c) == 5 && computes(c, now), now)) c.scanner_cable.cut();
     if (cut.is_over(2s, now)) c.scanner_cable.mend();
-    held = held || (c.controller.cell().state() == CellState::held && c.controller.cell().cause() == HoldCause::scanner);
+    held = held || (c.controller.cell().state() == CellState::held &&
+                    c.controller.cell().cause() == HoldCause::scanner);
   });
   CHECK(held);
   CHECK(run.exit_code == firmware_like::exit_done);
@@ -86,7 +87,9 @@ TEST_CASE("scanner cable cut while it computes: the cell holds, reconnects, gets
   CHECK(run.summary["shots"]["surface"] == 16);
 }
 
-TEST_CASE("scanner cable cut and mended while the arm moves: the cell goes on although the scanner is back before it holds") {
+TEST_CASE(
+    "scanner cable cut and mended while the arm moves: the cell goes on although the scanner is back before "
+    "it holds") {
   for (const auto pause : {0ms, 1ms, 300ms}) {
     CAPTURE(pause.count());
     ScriptedRun cell;

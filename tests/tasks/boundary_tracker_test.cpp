@@ -85,7 +85,8 @@ TEST_CASE("where the boundary hides, the head turns so that stripes cross both w
   tracker.begin(start);
   // A straight piece along world +x through the field's middle, made by hand: scanner at yaw 0, stripes along y.
   std::vector<geometry::EdgePoint> points;
-  for (int i = 0; i < 20; ++i) points.push_back({.position = {2.0 * i - 20, 0, 0}, .stripe = static_cast<std::uint16_t>(i)});
+  for (int i = 0; i < 20; ++i)
+    points.push_back({.position = {2.0 * i - 20, 0, 0}, .stripe = static_cast<std::uint16_t>(i)});
   geometry::BoundaryPiece piece;
   piece.count = 20;
   piece.tangent_first = piece.tangent_last = {1, 0};
@@ -93,7 +94,10 @@ TEST_CASE("where the boundary hides, the head turns so that stripes cross both w
     geometry::BoundaryViewer::View view;
     view.points = points;
     view.pieces = {&piece, 1};
-    return tracker.take({.world_from_scanner = geometry::turned_about_z(0, start.centre), .plate_found = true, .plate_z_mm = 6, .view = view});
+    return tracker.take({.world_from_scanner = geometry::turned_about_z(0, start.centre),
+                         .plate_found = true,
+                         .plate_z_mm = 6,
+                         .view = view});
   };
   REQUIRE(show().to == TrackState::first_side);
   REQUIRE(show().to == TrackState::track);

@@ -21,7 +21,8 @@ TEST_CASE("a quadric plate is found from points round its border") {
 TEST_CASE("points along one line leave the rest level instead of wild") {
   HeightModel model;
   for (double x = 0; x < 300; x += 5) {
-    const double noise = std::fmod(x, 15) < 5 ? 0.05 : -0.025;  // whose slope across the line would be 5 mm a millimetre
+    const double noise =
+        std::fmod(x, 15) < 5 ? 0.05 : -0.025;  // whose slope across the line would be 5 mm a millimetre
     model.add({x, 0.2 * noise, 10 + 0.01 * x + noise});
   }
   model.solve();

@@ -29,8 +29,12 @@ TEST_CASE("a target within every limit may be sent") {
 }
 
 TEST_CASE("each limit refuses by its name and value") {
-  CHECK(refusal({.x_mm = 801, .z_mm = 300}) == "target outside the workspace: x 801.0 mm, limit -800.0 to 800.0 mm: move the plate, or widen [robot.workspace] if the arm may go there");
-  CHECK(refusal({.x_mm = 500, .z_mm = 199}) == "target outside the workspace: z 199.0 mm, limit 200.0 to 500.0 mm: move the plate, or widen [robot.workspace] if the arm may go there");
+  CHECK(refusal({.x_mm = 801, .z_mm = 300}) ==
+        "target outside the workspace: x 801.0 mm, limit -800.0 to 800.0 mm: move the plate, or widen "
+        "[robot.workspace] if the arm may go there");
+  CHECK(refusal({.x_mm = 500, .z_mm = 199}) ==
+        "target outside the workspace: z 199.0 mm, limit 200.0 to 500.0 mm: move the plate, or widen "
+        "[robot.workspace] if the arm may go there");
   CHECK(refusal({.x_mm = 100, .y_mm = 100, .z_mm = 300}).find("reach 141.4") != std::string::npos);
   CHECK(refusal({.x_mm = -500, .z_mm = 300}).find("step 1000.0") != std::string::npos);
   CHECK(refusal({.x_mm = 500, .z_mm = 300}, 81).find("speed 81 %") != std::string::npos);

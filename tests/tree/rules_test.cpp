@@ -96,7 +96,7 @@ TEST_CASE("a sleep is found anywhere, waiting by the clock is not") {
   CHECK_FALSE(breaks(banned_findings("tasks/a.cpp", "// never usleep(1)\nauto s = \"usleep(1)\";")));
 }
 
-TEST_CASE("reading time outside hal/clock.cpp is found; a test may measure") {
+TEST_CASE("reading time outside hal/clock.cpp is found, while a test may measure") {
   CHECK(breaks(banned_findings("tasks/a.cpp", "auto t = std::chrono::steady_clock::now();")));
   CHECK(breaks(banned_findings("hal/tcp_link.cpp", "clock_gettime(CLOCK_MONOTONIC, &t);")));
   CHECK(breaks(banned_findings("host_sim/a.hpp",
@@ -159,6 +159,13 @@ TEST_CASE("names that say nothing are found, as rooms, as files and as parts of 
   }
   CHECK_FALSE(breaks(name_findings("hal/clock.hpp")));
   CHECK_FALSE(breaks(name_findings("geometry/utilization.hpp")));
+}
+
+TEST_CASE("a semicolon in a test's name is found, also where the name goes over two lines") {
+  CHECK(test_name_findings("tests/hal/a.cpp", "int a;\nTEST_CASE(\"one; two\") {\n") ==
+        Findings{"tests/hal/a.cpp:2: a semicolon in a test's name: ctest would never run it"});
+  CHECK(breaks(test_name_findings("tests/hal/a.cpp", "TEST_CASE(\n    \"one \"\n    \"two; three\") {\n")));
+  CHECK_FALSE(breaks(test_name_findings("tests/hal/a.cpp", "TEST_CASE(\"one\") { f(\";\"); }\n")));
 }
 
 TEST_CASE("a folder that the design does not know is found at the top") {
