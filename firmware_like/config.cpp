@@ -8,6 +8,7 @@
 #include <numbers>
 #include <sstream>
 
+#include "firmware_like/memory_plan.hpp"
 #include "firmware_like/toml_section.hpp"
 
 namespace moldloft::firmware_like {
@@ -48,7 +49,7 @@ void read_scanner(TomlSection s, ScannerConfig& c) {
 
 void read_range(TomlSection& s, std::string_view key, tasks::Range& range) {
   std::array<double, 2> v{range.min, range.max};
-  s.numbers(key, v, -1e5, 1e9);
+  s.range(key, v, -1e5, 1e5);
   range = {v[0], v[1]};
 }
 
@@ -130,6 +131,36 @@ void flatten(const toml::table& table, const std::string& prefix, std::map<std::
   }
 }
 
+// What no key can say alone. The error names the line of the first of `keys` that stands in the file: the others have
+// their defaults.
+std::string impossible(const toml::table& table, const std::string& path, std::initializer_list<std::string_view> keys, std::string_view what) {
+  std::string line;
+  for (const auto key : keys) {
+    const auto node = table.at_path(key);
+    if (node && line.empty()) line = fmt::format(":{}", node.node()->source().begin.line);
+  }
+  return fmt::format("{}{}: {}", path, line, what);
+}
+
+std::optional<std::string> check_together(const toml::table& table, const CellConfig& c) {
+  const double field = std::min(c.scanner.field_x_mm, c.scanner.field_y_mm);
+  if (2 * c.scan_overlap_mm > field) {
+    return impossible(table, c.path, {"scan.overlap_mm", "scanner.field_mm"},
+                      fmt::format("[scan] overlap_mm: {} is more than half of [scanner] field_mm", c.scan_overlap_mm));
+  }
+  // The next field is centred on the boundary's continuation: with more overlap than this the tracker would hardly advance.
+  if (2 * c.tracking_overlap_mm > 0.9 * field) {
+    return impossible(table, c.path, {"tracking.overlap_mm", "scanner.field_mm"},
+                      fmt::format("[tracking] overlap_mm: {} is more than 0.45 of [scanner] field_mm", c.tracking_overlap_mm));
+  }
+  const tasks::CellSettings cell = cell_settings(c);
+  if (const std::size_t shots = static_cast<std::size_t>(cell.tracker.max_shots) + cell.max_surface_shots; shots > tasks::max_shot_number) {
+    return impossible(table, c.path, {"plate.largest_mm", "scanner.field_mm", "tracking.overlap_mm"},
+                      fmt::format("[plate] largest_mm: asks for {} shots of this field, a run takes {} at most", shots, tasks::max_shot_number));
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::string first_difference(const std::string& text, const std::string& other) {
@@ -154,6 +185,8 @@ CellConfig default_config() {
   CellConfig c;
   c.scanner.tip_from_scanner = mount_from({0, 140, 300}, {0, 180, 180});
   c.start.centre << 500, 0, 10;
+  // A SCARA of 800 mm: a limit that is left out must be a limit all the same.
+  c.robot.workspace = {.x_mm = {-800, 800}, .y_mm = {-800, 800}, .z_mm = {200, 600}, .reach_mm = {200, 800}, .max_step_mm = 1500};
   return c;
 }
 
@@ -171,11 +204,9 @@ std::expected<CellConfig, ConfigError> parse_config(const std::string& text, con
     read_robot(file.section("robot"), config.robot);
     read_rest(file, config);
     file.finish();
+    if (!error) error = check_together(table, config);
   } catch (const toml::parse_error& e) {
     error = fmt::format("{}:{}: {}", path, e.source().begin.line, e.description());
-  }
-  if (!error && 2 * config.scan_overlap_mm > std::min(config.scanner.field_x_mm, config.scanner.field_y_mm)) {
-    error = fmt::format("{}: [scan] overlap_mm {} is more than half of [scanner] field_mm", path, config.scan_overlap_mm);
   }
   if (error) return std::unexpected{ConfigError{*error}};
   return config;

@@ -45,7 +45,7 @@ void DisplayThread::work() {
 }
 
 void DisplayThread::show(const tasks::CellProgress& p) {
-  if (!begun_ && p.phase != tasks::Phase::none) {
+  if (!begun_ && p.state == tasks::CellState::execute) {
     begun_ = true;
     fmt::print(stderr, "{}{}\n", terminal_ ? "\r\x1b[K" : "", head_);
   }

@@ -132,8 +132,9 @@ std::expected<void, RunError> write_file(const std::filesystem::path& path, std:
   file.close();
   std::error_code failed;
   if (file) std::filesystem::rename(beside, path, failed);
-  if (!file || failed) return std::unexpected{RunError{fmt::format("{}: cannot be written; is the disk full or read-only?", path.string())}};
-  return {};
+  if (file && !failed) return {};
+  std::filesystem::remove(beside, failed);
+  return std::unexpected{RunError{fmt::format("{}: cannot be written; is the disk full or read-only?", path.string())}};
 }
 
 namespace {

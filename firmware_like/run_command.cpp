@@ -22,21 +22,32 @@ int complain(std::string_view what) {
 }
 
 std::atomic<tasks::Cell*> interrupted_cell{nullptr};
+std::atomic<bool> interrupted{false};
 
 // The first ctrl-C stops the arm and saves; the second ends the program the hard way.
 void on_interrupt(int signal) {
+  interrupted = true;
   if (tasks::Cell* cell = interrupted_cell.load()) cell->command(tasks::CellEvent::stop);
   std::signal(signal, SIG_DFL);
 }
 
+// From before the first file is made to after the cell has come to rest: a ctrl-C in between never leaves half of either.
 class InterruptGuard {
  public:
-  explicit InterruptGuard(tasks::Cell& cell) {
-    interrupted_cell = &cell;
+  InterruptGuard() {
+    interrupted = false;
     std::signal(SIGINT, on_interrupt);
     std::signal(SIGTERM, on_interrupt);
   }
-  ~InterruptGuard() {
+  ~InterruptGuard() { let_go(); }
+  InterruptGuard(const InterruptGuard&) = delete;
+  InterruptGuard& operator=(const InterruptGuard&) = delete;
+
+  void stops(tasks::Cell& cell) {
+    interrupted_cell = &cell;
+    if (interrupted) cell.command(tasks::CellEvent::stop);
+  }
+  void let_go() {
     std::signal(SIGINT, SIG_DFL);
     std::signal(SIGTERM, SIG_DFL);
     interrupted_cell = nullptr;
@@ -120,6 +131,7 @@ int run_cell(const RunOptions& options) {
   if (!config) return complain(config.error().what);
   const std::filesystem::path out = options.out.empty() ? default_run_path() : std::filesystem::path{options.out};
   if (options.resume && options.out.empty()) return complain("--resume: give the run's folder with --out");
+  InterruptGuard guard;
   auto folder = options.resume ? resume_run(out, config->text) : create_run(out, config->text, RunKind::measured);
   if (!folder) return complain(folder.error().what);
 
@@ -128,14 +140,15 @@ int run_cell(const RunOptions& options) {
   const auto robot_link = hal::make_serial_link(config->robot.device, config->robot.baud);
   const auto controller = std::make_unique<Controller>(*config, clock, *scanner_link, *robot_link,
                                                        ControllerOptions{.archive = folder->archive.get(), .epoch = fresh_epoch()});
+  guard.stops(controller->cell());
   {
-    const InterruptGuard guard{controller->cell()};
     const RecorderThread recorder{controller->recorder(), *folder->store};
     const DisplayThread display{controller->cell(), memory_line(*controller)};
     controller->start();
     while (controller->tick()) {
     }
   }
+  guard.let_go();
   const int code = exit_code(*controller);
   if (!options.resume && !controller->cell().has_driven()) {
     discard_run(std::move(*folder));

@@ -71,6 +71,13 @@ void TomlSection::numbers(std::string_view key, std::span<double> values, double
   }
 }
 
+void TomlSection::range(std::string_view key, std::array<double, 2>& values, double min, double max) {
+  numbers(key, values, min, max);
+  if (const toml::node* n = node(key); n != nullptr && values[0] > values[1]) {
+    wrong(*n, key, fmt::format("from {} to {} is no range: the smaller number comes first", values[0], values[1]));
+  }
+}
+
 TomlSection TomlSection::section(std::string_view key) {
   const toml::node* n = node(key);
   const toml::table* table = n == nullptr ? nullptr : n->as_table();

@@ -4,6 +4,7 @@
 // Setup time only: allocates. The first error of a file wins and is reported with its line.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <set>
 #include <span>
@@ -25,6 +26,7 @@ class TomlSection {
   void text(std::string_view key, std::string& value);
   void choice(std::string_view key, std::string& value, const std::vector<std::string>& allowed);
   void numbers(std::string_view key, std::span<double> values, double min, double max);  // an array of that length
+  void range(std::string_view key, std::array<double, 2>& values, double min, double max);  // the smaller number first
   TomlSection section(std::string_view key);
   void finish();  // unknown keys are an error
 

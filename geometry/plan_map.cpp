@@ -36,6 +36,16 @@ std::array<double, 4> powers_on_span(std::span<const double> knots, int k, const
 
 }  // namespace
 
+PlanMap::PlanMap(int spans) {
+  const auto pieces = static_cast<std::size_t>(spans);
+  for (auto& side : outline_.sides) {
+    side.knots.reserve(pieces + 2 * cubic + 1);
+    side.control.reserve(pieces + cubic);
+  }
+  along_u_.reserve(pieces);
+  along_v_.reserve(pieces);
+}
+
 PlanMap::PlanMap(const Outline& outline) { assign(outline); }
 
 void PlanMap::assign(const Outline& outline) {

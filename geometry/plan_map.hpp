@@ -30,9 +30,9 @@ struct PlanPoint {
 
 class PlanMap {
  public:
-  PlanMap() = default;
+  explicit PlanMap(int spans = OutlineSettings{}.spans);  // has room for sides of so many spans
   explicit PlanMap(const Outline& outline);
-  void assign(const Outline& outline);  // without allocation when the sizes are the same
+  void assign(const Outline& outline);  // without allocation while there is room
 
   PlanPoint at(double u, double v) const;
   std::expected<void, Error> check() const;  // Jacobian positive on a 65 x 65 grid

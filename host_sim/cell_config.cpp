@@ -15,7 +15,7 @@ double roomy(double length_mm) { return std::ceil(length_mm * 1.1 / 50) * 50; }
 std::string workspace(const CellDescription& d) {
   if (d.arm == ArmKind::gantry) {
     const Eigen::Vector3d low = d.gantry.low_mm, high = low + d.gantry.size_mm;
-    return fmt::format("x_mm = [{}, {}]\ny_mm = [{}, {}]\nz_mm = [{}, {}]\nmax_step_mm = 4000\n", low.x(), high.x(), low.y(), high.y(),
+    return fmt::format("x_mm = [{}, {}]\ny_mm = [{}, {}]\nz_mm = [{}, {}]\nreach_mm = [0, 100000]\nmax_step_mm = 4000\n", low.x(), high.x(), low.y(), high.y(),
                        low.z(), high.z());
   }
   const double reach = d.scara.link_1_mm + d.scara.link_2_mm;

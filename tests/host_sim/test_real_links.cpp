@@ -3,6 +3,8 @@
 #include <doctest/doctest.h>
 
 #include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "firmware_like/run_command.hpp"
@@ -26,6 +28,13 @@ class Devices {
     REQUIRE_MESSAGE(child_.prints("ready:", 20s), child_.err());
   }
   std::string config() const { return folder_.file("cell.toml"); }
+  // The same with one line replaced, told by its beginning.
+  std::string config_with(const std::string& begins, const std::string& line) const {
+    std::istringstream lines{text_of(config())};
+    std::ofstream changed{folder_.file("changed.toml")};
+    for (std::string old; std::getline(lines, old);) changed << (old.starts_with(begins) ? line : old) << "\n";
+    return folder_.file("changed.toml");
+  }
 
  private:
   static std::vector<std::string> words(const hal::TemporaryFolder& folder, const std::vector<std::string>& more) {
@@ -139,4 +148,38 @@ TEST_CASE("a run that ctrl-C stops, then a power cut, goes on where it was with 
   check_files(out);
   check_truth(out);
   check_fit_repeats(out, folder.file("fit"));
+}
+
+TEST_CASE("a start pose off the plate and a plate that leaves the workspace end in one line that says what to do") {
+  const Devices devices;
+  const hal::TemporaryFolder folder;
+  const auto last_line = [](const std::string& text) {
+    const auto before = text.rfind('\n', text.size() - 2);
+    return before == std::string::npos ? text : text.substr(before + 1);
+  };
+  const auto saved = [&](const char* name) {
+    return ". What was measured is saved in " + folder.file(name) + " (overview.svg shows it); then begin a new run\n";
+  };
+  ChildProcess off{{MOLDLOFT, "run", devices.config_with("centre_mm", "centre_mm = [510, 400, 15]"), "--out", folder.file("off")}, PTY_MODEM};
+  CHECK(off.wait(run_limit) == firmware_like::exit_held);
+  CHECK(last_line(off.err()) ==
+        "moldloft: held: no plate under the scanner at x 510 y 400 mm: move [start] onto the plate" + saved("off"));
+  CHECK(off.out().empty());
+  CHECK(stored_shots(folder.file("off")) == 1);
+
+  ChildProcess beyond{{MOLDLOFT, "run", devices.config_with("y_mm", "y_mm = [-800, 50]"), "--out", folder.file("beyond")}, PTY_MODEM};
+  CHECK(beyond.wait(run_limit) == firmware_like::exit_aborted);
+  CHECK(last_line(beyond.err()).starts_with("moldloft: aborted: target outside the workspace: y "));
+  CHECK(last_line(beyond.err()).ends_with(
+      " mm, limit -800.0 to 50.0 mm: move the plate, or widen [robot.workspace] if the arm may go there" + saved("beyond")));
+  CHECK(beyond.out().empty());
+  CHECK(stored_shots(folder.file("beyond")) > 1);
+
+  // Nothing was measured here: no folder, and not a line before the one that says why.
+  const std::string never = folder.file("never");
+  ChildProcess refused{{MOLDLOFT, "run", devices.config_with("x_mm", "x_mm = [-800, 50]"), "--out", never}, PTY_MODEM};
+  CHECK(refused.wait(run_limit) == firmware_like::exit_failed);
+  CHECK(lines_in(refused.err()) == 1);
+  CHECK(refused.err().starts_with("moldloft: target outside the workspace: x "));
+  CHECK_FALSE(std::filesystem::exists(never));
 }

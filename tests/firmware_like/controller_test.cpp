@@ -1,0 +1,81 @@
+// The controller without devices: how each end of a run becomes an exit code, and a summary that has no result in it.
+#include "firmware_like/controller.hpp"
+
+#include <doctest/doctest.h>
+
+#include "firmware_like/results.hpp"
+#include "firmware_like/run_command.hpp"
+#include "hal/cable.hpp"
+
+using namespace moldloft;
+using namespace moldloft::firmware_like;
+using namespace std::chrono_literals;
+
+namespace {
+
+struct Bench {
+  hal::VirtualClock clock;
+  hal::Cable scanner{clock, {}}, robot{clock, {}};
+  std::unique_ptr<Controller> controller = std::make_unique<Controller>(default_config(), clock, scanner.host(), robot.host());
+
+  void run_to_rest() {
+    while (controller->tick() && clock.now() < 1min) {
+    }
+  }
+};
+
+}  // namespace
+
+TEST_CASE("devices that never answer: aborted after the configured time, by the name of the one that is missing") {
+  Bench bench;
+  bench.scanner.cut();
+  bench.controller->start();
+  bench.run_to_rest();
+  CHECK(bench.controller->at_rest());
+  CHECK(exit_code(*bench.controller) == exit_aborted);
+  CHECK(bench.controller->cell().why().view() == "scanner: the cable is cut");
+  CHECK(bench.clock.now() > 10s);
+  CHECK(bench.clock.now() < 11s);
+  CHECK_FALSE(bench.controller->cell().has_driven());
+}
+
+TEST_CASE("a stop before the devices are there ends at once") {
+  Bench bench;
+  bench.controller->start();
+  for (int i = 0; i < 10; ++i) bench.controller->tick();
+  CHECK_FALSE(bench.controller->at_rest());
+  bench.controller->cell().command(tasks::CellEvent::stop);
+  bench.run_to_rest();
+  CHECK(exit_code(*bench.controller) == exit_stopped);
+  CHECK(bench.clock.now() < 1s);
+}
+
+TEST_CASE("the summary of a run without result says so and promises none") {
+  Bench bench;
+  bench.controller->start();
+  bench.controller->cell().command(tasks::CellEvent::stop);
+  bench.run_to_rest();
+  const Json s = summary_of(*bench.controller, {.plate = "panel", .seed = {}});
+  CHECK(s["result"] == "stopped");
+  CHECK(s["plate"] == "panel");
+  CHECK(s["seed"].is_null());
+  CHECK(s["points"]["total"] == 0);
+  CHECK_FALSE(s.contains("surface"));
+  CHECK_FALSE(s.contains("boundary"));
+  CHECK(s["memory"]["plan_bytes"].get<std::size_t>() == total_plan(bench.controller->memory()));
+}
+
+TEST_CASE("the timing report names every row of the task table") {
+  Bench bench;
+  bench.controller->start();
+  for (int i = 0; i < 300; ++i) bench.controller->tick();
+  const Json t = timing_of(*bench.controller);
+  std::vector<std::string> names;
+  for (const auto& task : t["tasks"]) names.push_back(task["name"]);
+  CHECK(names == std::vector<std::string>{"scanner in", "robot in", "cell", "robot out", "scanner out", "health"});
+  CHECK(t["ticks"] == 300);
+  CHECK(t["missed_ticks"] == 0);
+  CHECK(t["tick_us"] == 1000.0);
+  CHECK(t["tasks"][0]["runs"] == 290);  // without the ten of the warm-up
+  CHECK(t["background"][0]["name"] == "surface");
+}

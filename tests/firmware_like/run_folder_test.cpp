@@ -1,0 +1,134 @@
+#include "firmware_like/run_folder.hpp"
+
+#include <doctest/doctest.h>
+
+#include <fstream>
+#include <regex>
+
+#include "hal/temporary_folder.hpp"
+
+using namespace moldloft;
+using namespace moldloft::firmware_like;
+namespace fs = std::filesystem;
+
+namespace {
+
+const std::string config = "[start]\nyaw_deg = 3\n";
+
+std::string refused(const std::expected<RunFolder, RunError>& run) { return run ? "" : run.error().what; }
+
+}  // namespace
+
+TEST_CASE("a run's folder is made with all folders above it, and holds the configuration as it was written") {
+  const hal::TemporaryFolder folder;
+  const fs::path path = folder.path() / "a" / "b";
+  {
+    const auto run = create_run(path, config, RunKind::measured);
+    REQUIRE_MESSAGE(run.has_value(), run.error().what);
+    CHECK(run->made_folder);
+    CHECK(run->archive == nullptr);
+  }
+  const auto run = open_run(path);
+  REQUIRE(run.has_value());
+  CHECK(*run->store->meta("config") == config);
+  CHECK(*run->store->meta("kind") == "measured");
+  CHECK(run->archive->size() == 0);
+  CHECK(run->archive->last() == 0);
+}
+
+TEST_CASE("a folder that cannot be made is refused with its path and the reason") {
+  const hal::TemporaryFolder folder;
+  std::ofstream{folder.file("file")} << "here\n";
+  CHECK(refused(create_run(folder.file("file"), config, RunKind::measured)) ==
+        folder.file("file") + ": cannot be created (Not a directory); give another --out");
+  CHECK(refused(create_run(folder.file("file/run"), config, RunKind::measured)) ==
+        folder.file("file/run") + ": cannot be created (Not a directory); give another --out");
+}
+
+TEST_CASE("a folder that cannot be written is refused before anything moves") {
+  const auto run = create_run("/proc/self", config, RunKind::measured);  // is there, and takes no file from anybody
+  REQUIRE_FALSE(run.has_value());
+  CHECK(run.error().what.starts_with("/proc/self/run.db: cannot be written"));
+}
+
+TEST_CASE("a measured run is never overwritten, neither by a measured nor by a simulated one") {
+  const hal::TemporaryFolder folder;
+  const std::string path = folder.file("run");
+  REQUIRE(create_run(path, config, RunKind::measured).has_value());
+  CHECK(refused(create_run(path, config, RunKind::measured)) ==
+        path + ": holds a run already; give another --out, or --resume to go on with it");
+  CHECK(refused(create_run(path, config, RunKind::simulated)) == path + ": holds a run already; give another --out");
+  CHECK(open_run(path).has_value());
+}
+
+TEST_CASE("a simulated run, which its seed brings back, makes room for another simulated run only") {
+  const hal::TemporaryFolder folder;
+  const std::string path = folder.file("run");
+  REQUIRE(create_run(path, config, RunKind::simulated).has_value());
+  CHECK_FALSE(create_run(path, config, RunKind::measured).has_value());
+  const auto again = create_run(path, "[start]\nyaw_deg = 4\n", RunKind::simulated);
+  REQUIRE(again.has_value());
+  CHECK_FALSE(again->made_folder);
+  CHECK(*again->store->meta("config") == "[start]\nyaw_deg = 4\n");
+}
+
+TEST_CASE("a run is resumed with the configuration that it was begun with, whatever the devices' addresses are today") {
+  const hal::TemporaryFolder folder;
+  const std::string path = folder.file("run");
+  REQUIRE(create_run(path, config, RunKind::measured).has_value());
+  CHECK(resume_run(path, config).has_value());
+  CHECK(resume_run(path, config + "[scanner]\nport = 9\n").has_value());
+  CHECK(refused(resume_run(path, "[start]\nyaw_deg = 4\n")) ==
+        path + ": was begun with another configuration ('start.yaw_deg' differs); resume it with the same, or begin a new run with another --out");
+}
+
+TEST_CASE("what is resumed is appended to; what is opened to be read is not") {
+  const hal::TemporaryFolder folder;
+  const std::string path = folder.file("run");
+  REQUIRE(create_run(path, config, RunKind::measured).has_value());
+  {
+    const auto resumed = resume_run(path, config);
+    REQUIRE(resumed.has_value());
+    CHECK(resumed->store->set_meta("note", "gone on").has_value());
+  }
+  const auto read = open_run(path);
+  REQUIRE(read.has_value());
+  CHECK(*read->store->meta("note") == "gone on");
+  CHECK_FALSE(read->store->set_meta("note", "changed").has_value());
+}
+
+TEST_CASE("a folder without a run, or with something else under the store's name, is refused by what is wrong") {
+  const hal::TemporaryFolder folder;
+  const std::string path = folder.path();
+  CHECK(refused(open_run(path)) == path + ": no run.db there; give the folder of a run");
+  CHECK(refused(resume_run(path, config)) == path + ": no run.db there; give the folder of a run");
+  CHECK(refused(open_run(folder.file("none"))) == folder.file("none") + ": no run.db there; give the folder of a run");
+  std::ofstream{folder.file("run.db")} << "these are no tables\n";
+  CHECK(refused(open_run(path)) == folder.file("run.db") + ": is not a run store");
+}
+
+TEST_CASE("a discarded run leaves no trace, and what else lies in the folder stays") {
+  const hal::TemporaryFolder folder;
+  auto own = create_run(folder.file("own"), config, RunKind::measured);
+  REQUIRE(own.has_value());
+  discard_run(std::move(*own));
+  CHECK_FALSE(fs::exists(folder.file("own")));
+
+  fs::create_directories(folder.file("mine"));
+  auto empty = create_run(folder.file("mine"), config, RunKind::measured);
+  REQUIRE(empty.has_value());
+  discard_run(std::move(*empty));
+  CHECK(fs::is_directory(folder.file("mine")));  // was there before
+  CHECK(fs::is_empty(folder.file("mine")));
+
+  std::ofstream{folder.file("mine/notes.txt")} << "keep\n";
+  auto beside = create_run(folder.file("mine"), config, RunKind::measured);
+  REQUIRE(beside.has_value());
+  discard_run(std::move(*beside));
+  CHECK(fs::exists(folder.file("mine/notes.txt")));
+  CHECK_FALSE(fs::exists(folder.file("mine/run.db")));
+}
+
+TEST_CASE("the default folder is named by date and time") {
+  CHECK(std::regex_match(default_run_path().string(), std::regex{R"(out/run-\d{8}-\d{6})"}));
+}

@@ -1,0 +1,160 @@
+// Bad input to the real programs, as a user meets it: one line on standard error that names what, where and what to do, an
+// exit code that is not 0, nothing on standard output, and nothing left behind that would block the next try.
+#include <doctest/doctest.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+
+#include "firmware_like/run_command.hpp"
+#include "host_sim/child_process.hpp"
+
+using namespace moldloft;
+using namespace moldloft::host_sim;
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+namespace {
+
+class Workbench {
+ public:
+  std::string path(const std::string& name) const { return folder_.file(name); }
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream{path(name)} << text;
+    return path(name);
+  }
+  // cell.example.toml with one line replaced, told by its beginning.
+  std::string example(const std::string& begins, const std::string& line) const {
+    std::ifstream file{MOLDLOFT_SOURCE_DIR "/firmware_like/cell.example.toml"};
+    std::string text;
+    bool found = false;
+    for (std::string old; std::getline(file, old);) {
+      const bool is_it = !begins.empty() && old.starts_with(begins);
+      found = found || is_it;
+      text += (is_it ? line : old) + "\n";
+    }
+    REQUIRE((found || begins.empty()));
+    return write("cell.toml", text);
+  }
+
+ private:
+  hal::TemporaryFolder folder_;
+};
+
+void check_refused(const Finished& program, const std::string& line, int exit_code = firmware_like::exit_failed) {
+  CHECK(program.exit_code == exit_code);
+  CHECK(program.err == line + "\n");
+  CHECK(program.out == "");
+}
+
+}  // namespace
+
+TEST_CASE("a configuration that is wrong is refused with file and line, and no run is begun") {
+  const Workbench bench;
+  const std::string out = bench.path("run");
+  const auto refuses = [&](const std::string& begins, const std::string& line, const std::string& what) {
+    const std::string config = bench.example(begins, line);
+    check_refused(run_program({MOLDLOFT, "run", config, "--out", out}), "moldloft: " + config + what);
+    CHECK_FALSE(fs::exists(out));
+  };
+  refuses("baud", "bauds = 9600", ":29: [robot] bauds: unknown key; known here: baud, device, driver, repeatability_z_mm, speed_percent, workspace");
+  refuses("baud", "baud = \"9600\"", ":29: [robot] baud: a whole number is wanted");
+  refuses("baud", "baud = 12", ":29: [robot] baud: 12 is outside 1200 to 921600");
+  refuses("x_mm", "x_mm = [800, -800]", ":34: [robot.workspace] x_mm: from 800 to -800 is no range: the smaller number comes first");
+}
+
+TEST_CASE("a configuration that is not there is refused by its path") {
+  check_refused(run_program({MOLDLOFT, "run", "/nowhere/cell.toml"}),
+                "moldloft: /nowhere/cell.toml: cannot be read; give the path of a cell configuration");
+}
+
+TEST_CASE("no scanner server: one line after the configured time, and the folder is free for the next try") {
+  const Workbench bench;
+  // Port 1 is nobody's on a machine that runs tests.
+  const std::string config = bench.write("cell.toml", "[cell]\ndevice_timeout_s = 0.5\n[scanner]\nport = 1\n");
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    check_refused(run_program({MOLDLOFT, "run", config, "--out", bench.path("run")}),
+                  "moldloft: scanner: 127.0.0.1:1: Connection refused (is the server running?); nothing was measured");
+    CHECK_FALSE(fs::exists(bench.path("run")));
+  }
+}
+
+TEST_CASE("no serial device: one line that names the device") {
+  const Workbench bench;
+  ChildProcess devices{{MOLDLOFT_SIM, "devices", "--scanner-port", "0", "--robot-pty", bench.path("robot"), "--cell", bench.path("fits.toml")}};
+  REQUIRE_MESSAGE(devices.prints("ready:", 20s), devices.err());
+  const std::string fits = text_of(bench.path("fits.toml"));
+  const std::string port = fits.substr(fits.find("port = "), fits.find('\n', fits.find("port = ")) - fits.find("port = "));
+  const auto with_device = [&](const std::string& device) {
+    return bench.write("cell.toml", "[cell]\ndevice_timeout_s = 0.5\n[scanner]\n" + port + "\n[robot]\ndevice = \"" + device + "\"\n");
+  };
+  check_refused(run_program({MOLDLOFT, "run", with_device("/dev/ttyNONE"), "--out", bench.path("run")}),
+                "moldloft: robot: /dev/ttyNONE does not exist: is the robot's cable plugged in, is the name right?; nothing was measured");
+  check_refused(run_program({MOLDLOFT, "run", with_device("/dev/null"), "--out", bench.path("run")}),
+                "moldloft: robot: /dev/null is not a serial port; nothing was measured");
+  CHECK_FALSE(fs::exists(bench.path("run")));
+}
+
+TEST_CASE("ctrl-C before the arm has moved ends at once and leaves nothing behind") {
+  const Workbench bench;
+  const std::string config = bench.write("cell.toml", "[scanner]\nport = 1\n");
+  ChildProcess run{{MOLDLOFT, "run", config, "--out", bench.path("run")}};
+  hal::SteadyClock clock;
+  while (!fs::exists(bench.path("run/run.db")) && clock.now() < 20s) clock.sleep_until(clock.now() + 5ms);
+  run.send(SIGINT);
+  CHECK(run.wait(20s) == firmware_like::exit_stopped);
+  CHECK(run.err() == "moldloft: stopped before anything was measured; nothing is kept\n");
+  CHECK_FALSE(fs::exists(bench.path("run")));
+}
+
+TEST_CASE("an output folder that cannot be written is refused before the devices are asked") {
+  const Workbench bench;
+  const std::string config = bench.example("", ""), file = bench.write("file", "");
+  for (const std::string program : {"run", "cell"}) {
+    CAPTURE(program);
+    const bool real = program == "run";
+    const auto refused = real ? run_program({MOLDLOFT, "run", config, "--out", file + "/run"}) : run_program({MOLDLOFT_SIM, "cell", "--out", file + "/run"});
+    check_refused(refused, (real ? "moldloft: " : "moldloft-sim cell: ") + file + "/run: cannot be created (Not a directory); give another --out");
+  }
+}
+
+TEST_CASE("a folder that holds a run is never overwritten, and resumed only with what it was begun with") {
+  const Workbench bench;
+  const std::string run = bench.path("run"), config = bench.example("", "");
+  REQUIRE(run_program({MOLDLOFT_SIM, "cell", "--out", run}).exit_code == 0);
+  const auto size = fs::file_size(run + "/run.db");
+  check_refused(run_program({MOLDLOFT, "run", config, "--out", run}),
+                "moldloft: " + run + ": holds a run already; give another --out, or --resume to go on with it");
+  check_refused(run_program({MOLDLOFT, "run", config, "--out", run, "--resume"}),
+                "moldloft: " + run + ": was begun with another configuration ('plate.largest_mm' differs); resume it with the same, or "
+                "begin a new run with another --out");
+  check_refused(run_program({MOLDLOFT, "fit", run, "--out", run}), "moldloft: " + run + ": is the run itself; give another folder with --out");
+  CHECK(fs::file_size(run + "/run.db") == size);
+}
+
+TEST_CASE("a folder that holds no run is neither resumed nor fitted") {
+  const Workbench bench;
+  const std::string config = bench.example("", ""), nothing = bench.path("nothing");
+  const std::string why = "moldloft: " + nothing + ": no run.db there; give the folder of a run";
+  check_refused(run_program({MOLDLOFT, "run", config, "--out", nothing, "--resume"}), why);
+  check_refused(run_program({MOLDLOFT, "fit", nothing, "--out", bench.path("fit")}), why);
+  check_refused(run_program({MOLDLOFT, "run", config, "--resume"}), "moldloft: --resume: give the run's folder with --out");
+  fs::create_directories(nothing);
+  bench.write("nothing/run.db", "these are no tables");
+  check_refused(run_program({MOLDLOFT, "fit", nothing, "--out", bench.path("fit")}), "moldloft: " + nothing + "/run.db: is not a run store");
+}
+
+TEST_CASE("a plate that is none is refused by what is wrong with it") {
+  const Workbench bench;
+  const std::string no_ply = bench.write("panel.ply", "solid panel\n"), out = bench.path("run");
+  check_refused(run_program({MOLDLOFT_SIM, "cell", "--plate", no_ply, "--out", out}), "moldloft-sim cell: " + no_ply + ": not a PLY file");
+  check_refused(run_program({MOLDLOFT_SIM, "cell", "--plate", bench.path("none.ply"), "--out", out}),
+                "moldloft-sim cell: " + bench.path("none.ply") + ": cannot be opened");
+  check_refused(run_program({MOLDLOFT_SIM, "devices", "--plate", no_ply}), "moldloft-sim devices: " + no_ply + ": not a PLY file");
+  check_refused(run_program({MOLDLOFT_SIM, "cell", "--plate", "cube", "--out", out}),
+                "moldloft-sim cell: no plate is called 'cube': choose flat, cylinder, saddle, twist, dome, wave, or a file that ends in .ply");
+  check_refused(run_program({MOLDLOFT_SIM, "cell", "--width", "900", "--out", out}),
+                "moldloft-sim cell: plate 'saddle' (900 x 900 mm) does not fit under the scara arm: choose a smaller plate, another place or "
+                "another arm");
+  CHECK_FALSE(fs::exists(out));
+}
