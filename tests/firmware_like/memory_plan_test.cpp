@@ -71,9 +71,10 @@ TEST_CASE("the plan is enough for the plate that it is made for") {
   CHECK(cell.tracker.max_shots >= 4 * 500 / 57 + 1);
   CHECK(cell.max_surface_shots >= 6 * 6);
   CHECK(cell.max_points == 50000);
-  // Spans of no more than the finest wanted, up to the factor of two between nets.
+  // No span shorter than the finest wanted, and none twice as long: nets go by powers of two.
   const auto surface = surface_settings(default_config());
-  CHECK(surface.fit.max_spans_u >= 50);
+  CHECK(500.0 / surface.fit.max_spans_u >= 10);
+  CHECK(500.0 / surface.fit.max_spans_u < 20);
   CHECK(surface.fit.max_shots >= static_cast<int>(cell.max_surface_shots) + cell.tracker.max_shots);
 }
 
