@@ -347,6 +347,12 @@ RunEnd kind_of_end(const Neighbour& beyond, const PlateRunSettings& settings) {
 std::expected<std::span<const PlateRun>, Error> PlateRunFinder::find(std::span<const StripeView> stripes,
                                                                      const Eigen::Vector3d& hint,
                                                                      const PlateRunSettings& settings) {
+  if (const auto begun = begin(stripes); !begun) return std::unexpected(begun.error());
+  if (const auto cut = cut_stripes(stripes.size(), settings); !cut) return std::unexpected(cut.error());
+  return finish(hint, settings);
+}
+
+std::expected<void, Error> PlateRunFinder::begin(std::span<const StripeView> stripes) {
   std::size_t points = 0;
   for (const StripeView& stripe : stripes) {
     assert(stripe.x.size() == stripe.z.size() && stripe.y.size() == stripe.z.size());
@@ -355,13 +361,27 @@ std::expected<std::span<const PlateRun>, Error> PlateRunFinder::find(std::span<c
   if (stripes.size() > max_stripes_ || points > max_points_) return std::unexpected(Error::capacity);
 
   good_.clear(), runs_.clear(), first_run_.clear(), found_.clear();
-  for (std::size_t s = 0; s < stripes.size(); ++s) {
+  stripes_ = stripes;
+  next_stripe_ = 0;
+  return {};
+}
+
+std::expected<bool, Error> PlateRunFinder::cut_stripes(std::size_t at_most, const PlateRunSettings& settings) {
+  const std::size_t end = std::min(stripes_.size(), next_stripe_ + at_most);
+  for (; next_stripe_ < end; ++next_stripe_) {
+    const StripeView& stripe = stripes_[next_stripe_];
     first_run_.push_back(static_cast<std::uint32_t>(runs_.size()));
     pieces_.clear();
-    if (!stripes[s].z.empty()) cut_stripe(stripes[s], settings);
-    if (!keep_runs(static_cast<std::uint16_t>(s), stripes[s], settings))
+    if (!stripe.z.empty()) cut_stripe(stripe, settings);
+    if (!keep_runs(static_cast<std::uint16_t>(next_stripe_), stripe, settings))
       return std::unexpected(Error::capacity);
   }
+  return next_stripe_ == stripes_.size();
+}
+
+std::expected<std::span<const PlateRun>, Error> PlateRunFinder::finish(const Eigen::Vector3d& hint,
+                                                                       const PlateRunSettings& settings) {
+  const std::span<const StripeView> stripes = stripes_;
   first_run_.push_back(static_cast<std::uint32_t>(runs_.size()));
   link_stripes(stripes, settings);
 

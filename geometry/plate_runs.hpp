@@ -67,9 +67,17 @@ class PlateRunFinder {
                                                        const Eigen::Vector3d& hint,
                                                        const PlateRunSettings& settings);
 
+  // The same in bounded pieces: begin(), cut_stripes() until it says true (6 us a stripe), finish(). The stripes are the
+  // caller's and must stay until then.
+  std::expected<void, Error> begin(std::span<const StripeView> stripes);
+  std::expected<bool, Error> cut_stripes(std::size_t at_most, const PlateRunSettings& settings);
+  std::expected<std::span<const PlateRun>, Error> finish(const Eigen::Vector3d& hint, const PlateRunSettings& settings);
+
   std::size_t bytes() const;
 
  private:
+  std::span<const StripeView> stripes_;  // of the frame at hand
+  std::size_t next_stripe_ = 0;
   struct Run;    // a stretch of good points on one stripe, linked into its region
   struct Piece;  // a stretch of one stripe before stretches are joined
 

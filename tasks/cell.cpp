@@ -51,6 +51,7 @@ void Cell::run(Instant now) {
   }
   if (const auto event = robot_.next_event()) on_robot(*event);
   if (const auto event = scanner_.next_event()) on_scanner(*event);
+  if (looking_ && !surface_.looking()) use_shot();
   advance_state();
   publish();
 }
@@ -87,6 +88,7 @@ void Cell::enter(CellAction action) {
       break;
     case CellAction::forget_run:
       wanted_.reset();
+      looking_ = false;
       shot_state_ = ShotState::parked;
       set_phase(Phase::none);
       break;

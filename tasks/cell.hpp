@@ -139,6 +139,7 @@ class Cell final : public Task {
   void give_up(const hal::Message&);
   bool deliver_archived();
   void skip_given_up();
+  bool frame_is_done() const;
   bool may_expose() const;
   Eigen::Vector3d hint_in_world(const Order&) const;
 
@@ -146,7 +147,8 @@ class Cell final : public Task {
   void set_phase(Phase);
   void measure();
   void advance_phase();
-  void use_shot(const Order&, const hal::Frame&);
+  void look_at(const Order&, const hal::Frame&);
+  void use_shot();
   std::optional<double> learn_heights(const geometry::RigidMotion& world_from_scanner);
   void use_boundary_shot(const Order&, const geometry::RigidMotion& world_from_scanner, std::optional<double> plate_z_mm);
   void plan_surface();
@@ -172,7 +174,8 @@ class Cell final : public Task {
 
   ShotState shot_state_ = ShotState::parked;
   std::optional<Order> wanted_;
-  Order arm_, exposed_;
+  Order arm_, exposed_, looked_at_;
+  bool looking_ = false;  // the background work has the last frame
   hal::Pose standing_;
   std::uint32_t last_number_ = 0, epoch_ = 0;
 

@@ -56,7 +56,7 @@ void Cell::advance_phase() {
       if (surface_.outline_ready()) plan_surface();
       return;
     case Phase::scan_surface:
-      if (surface_next_ == surface_planned_ && !wanted_ && shot_state_ == ShotState::parked && surface_.stage() == Stage::open) {
+      if (surface_next_ == surface_planned_ && !wanted_ && !looking_ && shot_state_ == ShotState::parked && surface_.stage() == Stage::open) {
         surface_.solve();
         set_phase(Phase::finish_fit);
       }
@@ -70,20 +70,29 @@ void Cell::advance_phase() {
   }
 }
 
-void Cell::use_shot(const Order& order, const hal::Frame& frame) {
+// Hands a shot's frame to the background work for finding the plate in it; use_shot() follows when that is done.
+void Cell::look_at(const Order& order, const hal::Frame& frame) {
   ++taken_[static_cast<std::size_t>(order.purpose)];
   points_seen_ += frame.point_count;
+  looked_at_ = order;
   const geometry::RigidMotion world_from_scanner = motion_of(order.reported) * settings_.tip_from_scanner;
-  const Eigen::Vector3d hint = world_from_scanner.inverse() * hint_in_world(order);
   // Nobody knows a plate's height before it was seen; from then on the hint is good to a step's slope.
   const double reach = order.purpose == ShotPurpose::seek ? settings_.depth_mm : hint_reach_mm;
-  const bool found = view_.look(frame, hint, reach);
+  view_.begin(frame, world_from_scanner.inverse() * hint_in_world(order), reach);
+  surface_.look(view_);
+  looking_ = true;
+}
+
+void Cell::use_shot() {
+  looking_ = false;
+  const Order& order = looked_at_;
+  const geometry::RigidMotion world_from_scanner = motion_of(order.reported) * settings_.tip_from_scanner;
   if (order.purpose == ShotPurpose::surface) {
-    if (found) surface_.fold(view_, world_from_scanner);
+    if (view_.found()) surface_.fold(view_, world_from_scanner);
     return;
   }
   boundary_places_.push_back(order.place);
-  const std::optional<double> height = found ? learn_heights(world_from_scanner) : std::nullopt;
+  const std::optional<double> height = view_.found() ? learn_heights(world_from_scanner) : std::nullopt;
   if (height) surface_.keep(view_, world_from_scanner);
   use_boundary_shot(order, world_from_scanner, height);
 }

@@ -52,10 +52,14 @@ void Cell::sequence() {
   if (shot_state_ == ShotState::in_place && recorder_.store_failed()) hold(HoldCause::recorder, recorder_.store_error());
 }
 
-bool Cell::may_expose() const {
+// The next frame would overwrite the last one: nobody may need that any more.
+bool Cell::frame_is_done() const {
   const auto stage = surface_.stage();
-  const bool fit_has_room = stage != SurfaceTask::Stage::folding && stage != SurfaceTask::Stage::folding_reserve;
-  return fit_has_room && scanner_.state() == hal::ScannerState::ready && recorder_.room_for_frame() &&
+  return !looking_ && stage != SurfaceTask::Stage::folding && stage != SurfaceTask::Stage::folding_reserve;
+}
+
+bool Cell::may_expose() const {
+  return frame_is_done() && scanner_.state() == hal::ScannerState::ready && recorder_.room_for_frame() &&
          !recorder_.store_failed();
 }
 
@@ -168,7 +172,7 @@ void Cell::deliver() {
                   .reported = exposed_.reported,
                   .payload_offset = scanner_.frame_offset(),
                   .payload_bytes = scanner_.frame_bytes()});
-  use_shot(exposed_, frame);
+  look_at(exposed_, frame);
 }
 
 // A surface shot that the archive leaves out before later ones was given up when the run was recorded, and its place was
@@ -186,8 +190,7 @@ void Cell::skip_given_up() {
 bool Cell::deliver_archived() {
   const ArchivedShot* shot = archive_ == nullptr ? nullptr : archive_->find(wanted_->number);
   if (shot == nullptr) return false;
-  const auto stage = surface_.stage();
-  if (stage == SurfaceTask::Stage::folding || stage == SurfaceTask::Stage::folding_reserve) return true;  // later
+  if (!frame_is_done()) return true;  // later
   exposed_ = *wanted_;
   wanted_.reset();
   exposed_.shot_id = shot->record.shot_id;
@@ -198,7 +201,7 @@ bool Cell::deliver_archived() {
   record("shot", "archived", "", "");
   if (phase_ == Phase::scan_surface) next_surface_shot();
   last_frame_ = now_;
-  use_shot(exposed_, *shot->frame);
+  look_at(exposed_, *shot->frame);
   return true;
 }
 

@@ -1,6 +1,7 @@
 #include "tasks/shot_view.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 namespace moldloft::tasks {
@@ -20,19 +21,31 @@ std::size_t ShotView::bytes() const {
   return finder_.bytes() + viewer_.bytes() + stripes_.capacity() * sizeof(geometry::StripeView);
 }
 
-bool ShotView::look(const hal::Frame& frame, const Eigen::Vector3d& hint, double reach_mm) {
-  frame_ = &frame;
+void ShotView::begin(const hal::Frame& frame, const Eigen::Vector3d& hint, double reach_mm) {
   settings_.runs.hint_reach_mm = reach_mm;
+  hint_ = hint;
+  runs_ = {};
+  boundary_ = {};
   stripes_.clear();
   for (const auto& line : frame.lines()) {
     const auto column = [&](const std::vector<float>& c) { return std::span{c}.subspan(line.first, line.count); };
     stripes_.push_back({column(frame.x), column(frame.y), column(frame.z)});
   }
-  const auto found = finder_.find(stripes_, hint, settings_.runs);
-  runs_ = found ? *found : std::span<const PlateRun>{};
-  boundary_ = found ? viewer_.look(runs_, stripes_.size(), settings_.boundary) : geometry::BoundaryViewer::View{};
+  // A frame beyond the memory plan cannot come: the driver was told the same limits.
+  const auto begun = finder_.begin(stripes_);
+  assert(begun.has_value());
+  (void)begun;
+}
+
+bool ShotView::step() {
+  const auto cut = finder_.cut_stripes(stripes_a_step, settings_.runs);
+  if (cut && !*cut) return false;
+  if (const auto found = cut ? finder_.finish(hint_, settings_.runs) : std::unexpected{cut.error()}; found) {
+    runs_ = *found;
+    boundary_ = viewer_.look(runs_, stripes_.size(), settings_.boundary);
+  }
   rewind(1);
-  return found.has_value();
+  return true;
 }
 
 void ShotView::rewind(std::uint32_t stride) {

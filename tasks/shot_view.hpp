@@ -1,7 +1,7 @@
 // From a frame to what the cell makes of it: the plate's runs, the boundary's pieces, the points that lie on the plate.
 //
 // Frame        scanner coordinates in, scanner coordinates out; the caller registers with the shot's pose
-// Cost         about 0.2 ms for 100 stripes of 500 points
+// Cost         0.6 ms for 100 stripes of 500 points, in pieces of about 0.1 ms
 // Allocation   in the constructor only
 #pragma once
 
@@ -25,8 +25,11 @@ class ShotView {
  public:
   ShotView(std::size_t max_stripes, std::size_t max_points, const ShotViewSettings&);
 
-  // Looks at a frame; `hint` is a point on the plate, good to `reach_mm`. False when nothing of the plate is there.
-  bool look(const hal::Frame& frame, const Eigen::Vector3d& hint, double reach_mm);
+  // Looks at a frame, which must stay as it is; `hint` is a point on the plate, good to `reach_mm`.
+  // In bounded pieces: begin(), then step() until it says true, then found() and the rest may be asked.
+  void begin(const hal::Frame& frame, const Eigen::Vector3d& hint, double reach_mm);
+  bool step();
+  bool found() const { return !runs_.empty(); }
 
   const geometry::BoundaryViewer::View& boundary() const { return boundary_; }
   std::span<const geometry::PlateRun> runs() const { return runs_; }
@@ -39,6 +42,7 @@ class ShotView {
   std::size_t bytes() const;
 
  private:
+  static constexpr std::size_t stripes_a_step = 16;
   bool within_margins(const geometry::PlateRun&, std::uint32_t point) const;
   bool is_outlier(const geometry::PlateRun&, std::uint32_t point) const;
 
@@ -48,7 +52,7 @@ class ShotView {
   std::vector<geometry::StripeView> stripes_;
   std::span<const geometry::PlateRun> runs_;
   geometry::BoundaryViewer::View boundary_;
-  const hal::Frame* frame_ = nullptr;
+  Eigen::Vector3d hint_{0, 0, 0};
   std::size_t run_ = 0;         // where the walk stands
   std::uint32_t point_ = 0, stride_ = 1;
 };

@@ -12,6 +12,7 @@ SurfaceTask::SurfaceTask(const SurfaceTaskSettings& settings)
 
 void SurfaceTask::begin() {
   stage_ = Stage::idle;
+  looking_at_ = nullptr;
   reserve_.clear();
   reserve_ends_.clear();
   reserve_next_ = reserve_shot_ = 0;
@@ -51,11 +52,15 @@ void SurfaceTask::solve() {
 }
 
 bool SurfaceTask::has_work() const {
-  return stage_ == Stage::choosing_corners || stage_ == Stage::building_outline || stage_ == Stage::folding_reserve || stage_ == Stage::folding ||
+  return looking() || stage_ == Stage::choosing_corners || stage_ == Stage::building_outline || stage_ == Stage::folding_reserve || stage_ == Stage::folding ||
          stage_ == Stage::solving;
 }
 
 void SurfaceTask::step(Instant) {
+  if (looking()) {
+    if (looking_at_->step()) looking_at_ = nullptr;
+    return;
+  }
   switch (stage_) {
     case Stage::choosing_corners: return step_corners();
     case Stage::building_outline: return step_outline();

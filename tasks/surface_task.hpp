@@ -55,6 +55,9 @@ class SurfaceTask final : public BackgroundTask {
   void begin();
   // Keeps a thinned copy of the plate's points of a boundary shot. At once: 3,000 points take about 50 us.
   void keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner);
+  // Looks at the frame that `shot` has begun; looking() turns false when its view is there. Goes before all else.
+  void look(ShotView& shot) { looking_at_ = &shot; }
+  bool looking() const { return looking_at_ != nullptr; }
   // `corner_candidates`: what the tracker took for corners; more than four is no harm.
   void build_outline(std::span<const Eigen::Vector2d> edges, std::span<const Eigen::Vector2d> corner_candidates);
   // Folds a surface shot in; `shot` and its frame stay untouched by others until stage() is open again.
@@ -100,6 +103,7 @@ class SurfaceTask final : public BackgroundTask {
   geometry::Error error_{};
   std::size_t reserve_next_ = 0, reserve_shot_ = 0;
   ShotView* shot_ = nullptr;
+  ShotView* looking_at_ = nullptr;
   geometry::RigidMotion world_from_scanner_;
   int shots_ = 0;
 };

@@ -58,10 +58,12 @@ inline Walk walk_round(BoundaryTracker& tracker, const FlatWorld& world, const S
     const auto motion = geometry::turned_about_z(place.head_yaw, place.centre);
     world.expose(motion, frame);
     const bool seeking = tracker.state() == TrackState::seek_edge;
-    const bool found = view.look(frame, motion.inverse() * tracker.plate_hint(), seeking ? 60 : 18);
+    view.begin(frame, motion.inverse() * tracker.plate_hint(), seeking ? 60 : 18);
+    while (!view.step()) {
+    }
     // Without a table height to tell them apart the higher of the two levels is the plate.
     const double table_z = world.table_z + 1 - place.centre.z();
-    const bool on_plate = found && !view.runs().empty() &&
+    const bool on_plate = view.found() &&
                           frame.z[view.runs().front().first + view.runs().front().stripe * 500u] > table_z;
     walk.last = tracker.take({.world_from_scanner = motion,
                               .plate_found = on_plate,
