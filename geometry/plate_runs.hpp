@@ -67,8 +67,8 @@ class PlateRunFinder {
                                                        const Eigen::Vector3d& hint,
                                                        const PlateRunSettings& settings);
 
-  // The same in bounded pieces: begin(), cut_stripes() until it says true (6 us a stripe), finish(). The stripes are the
-  // caller's and must stay until then.
+  // The same in bounded pieces: begin(), cut_stripes() until it says true (6 us a stripe), finish(). The stripes are
+  // the caller's and must stay until then.
   std::expected<void, Error> begin(std::span<const StripeView> stripes);
   std::expected<bool, Error> cut_stripes(std::size_t at_most, const PlateRunSettings& settings);
   std::expected<std::span<const PlateRun>, Error> finish(const Eigen::Vector3d& hint, const PlateRunSettings& settings);
