@@ -16,9 +16,11 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180;
 
-geometry::RigidMotion mount_from(const std::array<double, 3>& translation_mm, const std::array<double, 3>& zyz_deg) {
+geometry::RigidMotion mount_from(const std::array<double, 3>& translation_mm,
+                                 const std::array<double, 3>& zyz_deg) {
   geometry::RigidMotion mount = geometry::RigidMotion::Identity();
-  mount.linear() = geometry::rotation_from_zyz({zyz_deg[0] * degree, zyz_deg[1] * degree, zyz_deg[2] * degree});
+  mount.linear() =
+      geometry::rotation_from_zyz({zyz_deg[0] * degree, zyz_deg[1] * degree, zyz_deg[2] * degree});
   mount.translation() << translation_mm[0], translation_mm[1], translation_mm[2];
   return mount;
 }
@@ -133,7 +135,8 @@ void flatten(const toml::table& table, const std::string& prefix, std::map<std::
 
 // What no key can say alone. The error names the line of the first of `keys` that stands in the file: the others have
 // their defaults.
-std::string impossible(const toml::table& table, const std::string& path, std::initializer_list<std::string_view> keys, std::string_view what) {
+std::string impossible(const toml::table& table, const std::string& path,
+                       std::initializer_list<std::string_view> keys, std::string_view what) {
   std::string line;
   for (const auto key : keys) {
     const auto node = table.at_path(key);
@@ -145,18 +148,24 @@ std::string impossible(const toml::table& table, const std::string& path, std::i
 std::optional<std::string> check_together(const toml::table& table, const CellConfig& c) {
   const double field = std::min(c.scanner.field_x_mm, c.scanner.field_y_mm);
   if (2 * c.scan_overlap_mm > field) {
-    return impossible(table, c.path, {"scan.overlap_mm", "scanner.field_mm"},
-                      fmt::format("[scan] overlap_mm: {} is more than half of [scanner] field_mm", c.scan_overlap_mm));
+    return impossible(
+        table, c.path, {"scan.overlap_mm", "scanner.field_mm"},
+        fmt::format("[scan] overlap_mm: {} is more than half of [scanner] field_mm", c.scan_overlap_mm));
   }
-  // The next field is centred on the boundary's continuation: with more overlap than this the tracker would hardly advance.
+  // The next field is centred on the boundary's continuation: with more overlap than this the tracker would
+  // hardly advance.
   if (2 * c.tracking_overlap_mm > 0.9 * field) {
     return impossible(table, c.path, {"tracking.overlap_mm", "scanner.field_mm"},
-                      fmt::format("[tracking] overlap_mm: {} is more than 0.45 of [scanner] field_mm", c.tracking_overlap_mm));
+                      fmt::format("[tracking] overlap_mm: {} is more than 0.45 of [scanner] field_mm",
+                                  c.tracking_overlap_mm));
   }
   const tasks::CellSettings cell = cell_settings(c);
-  if (const std::size_t shots = static_cast<std::size_t>(cell.tracker.max_shots) + cell.max_surface_shots; shots > tasks::max_shot_number) {
-    return impossible(table, c.path, {"plate.largest_mm", "scanner.field_mm", "tracking.overlap_mm"},
-                      fmt::format("[plate] largest_mm: asks for {} shots of this field, a run takes {} at most", shots, tasks::max_shot_number));
+  if (const std::size_t shots = static_cast<std::size_t>(cell.tracker.max_shots) + cell.max_surface_shots;
+      shots > tasks::max_shot_number) {
+    return impossible(
+        table, c.path, {"plate.largest_mm", "scanner.field_mm", "tracking.overlap_mm"},
+        fmt::format("[plate] largest_mm: asks for {} shots of this field, a run takes {} at most", shots,
+                    tasks::max_shot_number));
   }
   return std::nullopt;
 }
@@ -168,7 +177,8 @@ std::string first_difference(const std::string& text, const std::string& other) 
   flatten(toml::parse(text), "", a);
   flatten(toml::parse(other), "", b);
   for (auto* keys : {&a, &b}) {
-    for (const char* addressed : {"cell.name", "cell.device_timeout_s", "scanner.host", "scanner.port", "robot.device", "robot.baud"}) {
+    for (const char* addressed : {"cell.name", "cell.device_timeout_s", "scanner.host", "scanner.port",
+                                  "robot.device", "robot.baud"}) {
       keys->erase(addressed);
     }
   }
@@ -186,7 +196,11 @@ CellConfig default_config() {
   c.scanner.tip_from_scanner = mount_from({0, 140, 300}, {0, 180, 180});
   c.start.centre << 500, 0, 10;
   // A SCARA of 800 mm: a limit that is left out must be a limit all the same.
-  c.robot.workspace = {.x_mm = {-800, 800}, .y_mm = {-800, 800}, .z_mm = {200, 600}, .reach_mm = {200, 800}, .max_step_mm = 1500};
+  c.robot.workspace = {.x_mm = {-800, 800},
+                       .y_mm = {-800, 800},
+                       .z_mm = {200, 600},
+                       .reach_mm = {200, 800},
+                       .max_step_mm = 1500};
   return c;
 }
 
@@ -216,7 +230,8 @@ std::expected<CellConfig, ConfigError> load_config(const std::string& path) {
   std::ifstream file{path};
   std::ostringstream text;
   if (!file || !(text << file.rdbuf())) {
-    return std::unexpected{ConfigError{fmt::format("{}: cannot be read; give the path of a cell configuration", path)}};
+    return std::unexpected{
+        ConfigError{fmt::format("{}: cannot be read; give the path of a cell configuration", path)}};
   }
   return parse_config(text.str(), path);
 }

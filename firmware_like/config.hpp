@@ -25,7 +25,7 @@ struct ScannerConfig {
   int max_points_per_stripe = 500;
   double field_x_mm = 102, field_y_mm = 102;
   double noise_mm = 0.051;
-  double depth_mm = 60;  // z is measured within +-this
+  double depth_mm = 60;                    // z is measured within +-this
   geometry::RigidMotion tip_from_scanner;  // the mount
 };
 
@@ -59,7 +59,7 @@ struct CellConfig {
   double seek_limit_mm = 3000;
   double scan_overlap_mm = 10;
   double scan_margin_mm = 2;
-  double finest_span_mm = 10;   // of the surface's net
+  double finest_span_mm = 10;  // of the surface's net
   double fit_tolerance_mm = 0.005;
 };
 
@@ -67,8 +67,9 @@ CellConfig default_config();
 std::expected<CellConfig, ConfigError> load_config(const std::string& path);
 std::expected<CellConfig, ConfigError> parse_config(const std::string& text, const std::string& path);
 
-// The first key whose value differs between two configurations and would make a run measure differently ("start.yaw_deg");
-// empty when there is none. Where the devices are found, names and comments make no difference.
+// The first key whose value differs between two configurations and would make a run measure differently
+// ("start.yaw_deg"); empty when there is none. Where the devices are found, names and comments make no
+// difference.
 std::string first_difference(const std::string& text, const std::string& other);
 
 }  // namespace moldloft::firmware_like

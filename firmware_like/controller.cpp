@@ -19,7 +19,8 @@ tasks::CellSettings settings_for(const CellConfig& config, const ControllerOptio
 
 // A frame of float32 points with intensity and its tables.
 std::size_t largest_frame(const CellConfig& c) {
-  const auto points = static_cast<std::size_t>(c.scanner.max_stripes) * static_cast<std::size_t>(c.scanner.max_points_per_stripe);
+  const auto points = static_cast<std::size_t>(c.scanner.max_stripes) *
+                      static_cast<std::size_t>(c.scanner.max_points_per_stripe);
   const std::size_t bytes_a_point = c.scanner.encoding == hal::psc1::Encoding::int16 ? 7 : 13;
   return points * bytes_a_point + static_cast<std::size_t>(c.scanner.max_stripes) * 16 + 4096;
 }
@@ -34,8 +35,8 @@ hal::Recorder::Sizes recorder_sizes(const CellConfig& c) {
 
 }  // namespace
 
-Controller::Controller(const CellConfig& config, hal::Clock& clock, hal::ByteLink& scanner_link, hal::ByteLink& robot_link,
-                       const ControllerOptions& options)
+Controller::Controller(const CellConfig& config, hal::Clock& clock, hal::ByteLink& scanner_link,
+                       hal::ByteLink& robot_link, const ControllerOptions& options)
     : config_{config},
       recorder_{recorder_sizes(config)},
       scanner_link_{scanner_link, hal::LinkId::scanner, recorder_, clock},
@@ -56,7 +57,9 @@ Controller::Controller(const CellConfig& config, hal::Clock& clock, hal::ByteLin
   scheduler_.add({.name = "cell", .budget = 300us}, cell_);
   scheduler_.add({.name = "robot out", .budget = 50us}, transmit_robot_);
   scheduler_.add({.name = "scanner out", .budget = 50us}, transmit_scanner_);
-  scheduler_.add({.name = "health", .period_ticks = 100, .budget = 20us, .criticality = tasks::Criticality::ordinary}, health_);
+  scheduler_.add(
+      {.name = "health", .period_ticks = 100, .budget = 20us, .criticality = tasks::Criticality::ordinary},
+      health_);
   scheduler_.add_background({.name = "surface", .quantum = 200us}, surface_);
 }
 
@@ -72,17 +75,20 @@ bool Controller::at_rest() const {
   switch (cell_.state()) {
     case tasks::CellState::complete:
     case tasks::CellState::stopped:
-    case tasks::CellState::aborted: return true;
+    case tasks::CellState::aborted:
+      return true;
     case tasks::CellState::held:
       return cell_.cause() == tasks::HoldCause::person || cell_.cause() == tasks::HoldCause::measurement;
-    default: return false;
+    default:
+      return false;
   }
 }
 
 void Controller::watch_health(hal::Instant) {
   if (scheduler_.misses_in_a_row() <= max_misses_in_a_row) return;
-  cell_.abort(hal::Message::format("{} ticks in a row came too late (last cause: {}): give the controller a core of its own",
-                                   scheduler_.misses_in_a_row(), scheduler_.name_of(scheduler_.last_miss_cause())));
+  cell_.abort(hal::Message::format(
+      "{} ticks in a row came too late (last cause: {}): give the controller a core of its own",
+      scheduler_.misses_in_a_row(), scheduler_.name_of(scheduler_.last_miss_cause())));
 }
 
 MemoryPlan Controller::memory() const {

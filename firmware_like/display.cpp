@@ -20,15 +20,19 @@ std::string progress_line(const tasks::CellProgress& p) {
   line += fmt::format("  boundary shots {:>3}", p.boundary_shots);
   if (p.surface_planned > 0) line += fmt::format("  surface {:>3}/{}", p.surface_shots, p.surface_planned);
   if (p.retaken > 0) line += fmt::format("  retaken {}", p.retaken);
-  if (p.time_left >= hal::Duration{0}) line += fmt::format("  left {:.0f} s", std::chrono::duration<double>(p.time_left).count());
+  if (p.time_left >= hal::Duration{0})
+    line += fmt::format("  left {:.0f} s", std::chrono::duration<double>(p.time_left).count());
   // What ends the run is said once, by its last line; what only holds it up is said here.
-  const bool goes_on_by_itself = p.cause == tasks::HoldCause::scanner || p.cause == tasks::HoldCause::recorder;
+  const bool goes_on_by_itself =
+      p.cause == tasks::HoldCause::scanner || p.cause == tasks::HoldCause::recorder;
   if (!p.why.empty() && goes_on_by_itself) line += fmt::format("  {}", p.why.view());
   return line;
 }
 
 DisplayThread::DisplayThread(const tasks::Cell& cell, std::string head)
-    : cell_{cell}, terminal_{isatty(STDERR_FILENO) != 0}, head_{std::move(head)}, thread_{[this] { work(); }} {}
+    : cell_{cell}, terminal_{isatty(STDERR_FILENO) != 0}, head_{std::move(head)}, thread_{[this] {
+        work();
+      }} {}
 
 DisplayThread::~DisplayThread() {
   ending_ = true;

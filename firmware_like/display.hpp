@@ -1,6 +1,6 @@
-// Progress for a person: one line that renews itself on a terminal, one line a change where the output is a file.
-// progress_line() is pure; DisplayThread is the ordinary thread that prints it. A run that ends before it has begun to
-// measure leaves nothing behind here: the one line that says why stands alone.
+// Progress for a person: one line that renews itself on a terminal, one line a change where the output is a
+// file. progress_line() is pure; DisplayThread is the ordinary thread that prints it. A run that ends before
+// it has begun to measure leaves nothing behind here: the one line that says why stands alone.
 #pragma once
 
 #include <atomic>
@@ -16,7 +16,8 @@ std::string progress_line(const tasks::CellProgress&);
 
 class DisplayThread {
  public:
-  DisplayThread(const tasks::Cell&, std::string head);  // `head` is printed once when the cell begins to measure
+  DisplayThread(const tasks::Cell&,
+                std::string head);  // `head` is printed once when the cell begins to measure
   ~DisplayThread();
   DisplayThread(const DisplayThread&) = delete;
   DisplayThread& operator=(const DisplayThread&) = delete;

@@ -19,7 +19,8 @@ int main(int argc, char** argv) {
   run_command->add_flag("--resume", run.resume, "go on with the run in --out after its last stored shot");
 
   FitOptions fit;
-  auto* fit_command = app.add_subcommand("fit", "outline and surface once more from the shots of a stored run");
+  auto* fit_command =
+      app.add_subcommand("fit", "outline and surface once more from the shots of a stored run");
   fit_command->add_option("run", fit.run, "the run's folder")->required();
   fit_command->add_option("--out", fit.out, "where the results go")->required();
 

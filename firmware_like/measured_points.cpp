@@ -8,14 +8,17 @@
 namespace moldloft::firmware_like {
 
 std::expected<std::vector<MeasuredPoint>, hal::StoreError> measured_points(const Controller& controller,
-                                                                           const hal::RunStore& store, std::size_t wanted,
+                                                                           const hal::RunStore& store,
+                                                                           std::size_t wanted,
                                                                            double gate_mm) {
   const auto shots = store.shots();
   if (!shots) return std::unexpected{shots.error()};
   const auto& surface = controller.surface().fit().surface();
   const geometry::PlanMap map{controller.surface().outline()};
   const auto stride = static_cast<std::uint32_t>(std::ceil(
-      std::sqrt(static_cast<double>(controller.surface().fit().report().points_used) / static_cast<double>(wanted)))) + 1;
+                          std::sqrt(static_cast<double>(controller.surface().fit().report().points_used) /
+                                    static_cast<double>(wanted)))) +
+                      1;
 
   std::vector<MeasuredPoint> points;
   Eigen::Vector2d guess{0.5, 0.5};
@@ -23,7 +26,8 @@ std::expected<std::vector<MeasuredPoint>, hal::StoreError> measured_points(const
     if (shot.purpose != hal::ShotPurpose::surface) continue;
     const auto frame = store.frame(shot);
     if (!frame) return std::unexpected{frame.error()};
-    const auto world_from_scanner = tasks::motion_of(shot.reported) * controller.config().scanner.tip_from_scanner;
+    const auto world_from_scanner =
+        tasks::motion_of(shot.reported) * controller.config().scanner.tip_from_scanner;
     for (const auto& line : frame->lines()) {
       if (line.index % stride != 0) continue;
       for (std::uint32_t i = line.first; i < line.first + line.count; i += stride) {
@@ -56,7 +60,10 @@ PlateField residual_field(const std::vector<MeasuredPoint>& points, int count) {
   std::vector<double> sums(cells);
   std::vector<int> counts(cells);
   for (const auto& p : points) {
-    const auto part = [&](float t) { return static_cast<std::size_t>(std::clamp(static_cast<int>(t * static_cast<float>(count)), 0, count - 1)); };
+    const auto part = [&](float t) {
+      return static_cast<std::size_t>(
+          std::clamp(static_cast<int>(t * static_cast<float>(count)), 0, count - 1));
+    };
     const std::size_t cell = part(p.u) * static_cast<std::size_t>(count) + part(p.v);
     sums[cell] += p.residual_mm;
     ++counts[cell];

@@ -1,5 +1,5 @@
-// The registered points of a finished run, read back from its store: for points.ply and for the residuals' picture.
-// Result time only: reads, allocates.
+// The registered points of a finished run, read back from its store: for points.ply and for the residuals'
+// picture. Result time only: reads, allocates.
 #pragma once
 
 #include <vector>
@@ -17,10 +17,12 @@ struct MeasuredPoint {
   float u, v;
 };
 
-// Points of the surface shots inside the outline, thinned to about `wanted`, within `gate_mm` of the surface (beyond lie
-// outliers and what is not the plate).
-std::expected<std::vector<MeasuredPoint>, hal::StoreError> measured_points(const Controller&, const hal::RunStore&,
-                                                                           std::size_t wanted, double gate_mm);
+// Points of the surface shots inside the outline, thinned to about `wanted`, within `gate_mm` of the surface
+// (beyond lie outliers and what is not the plate).
+std::expected<std::vector<MeasuredPoint>, hal::StoreError> measured_points(const Controller&,
+                                                                           const hal::RunStore&,
+                                                                           std::size_t wanted,
+                                                                           double gate_mm);
 
 // The mean residual in each of count x count cells of (u, v).
 PlateField residual_field(const std::vector<MeasuredPoint>&, int count);

@@ -91,7 +91,8 @@ tasks::SurfaceTaskSettings surface_settings(const CellConfig& c) {
   s.max_edge_points = cell.tracker.max_edge_points;
   s.max_boundary_shots = static_cast<std::size_t>(cell.tracker.max_shots) + 1;
   s.reserve_points_per_shot =
-      (cell.max_points + s.reserve_stride * s.reserve_stride - 1) / (s.reserve_stride * s.reserve_stride) + cell.max_stripes;
+      (cell.max_points + s.reserve_stride * s.reserve_stride - 1) / (s.reserve_stride * s.reserve_stride) +
+      cell.max_stripes;
   const double longer = std::max(c.plate.largest_x_mm, c.plate.largest_y_mm);
   const double shorter = std::min(c.plate.largest_x_mm, c.plate.largest_y_mm);
   s.fit.max_spans_u = finest_spans(longer, c.finest_span_mm);

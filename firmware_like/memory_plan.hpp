@@ -1,5 +1,5 @@
-// The memory plan: what the largest plate, the scanner's frames and the net ask for, subsystem by subsystem. Printed and
-// stored at start; after start the control thread takes no more.
+// The memory plan: what the largest plate, the scanner's frames and the net ask for, subsystem by subsystem.
+// Printed and stored at start; after start the control thread takes no more.
 #pragma once
 
 #include <string>

@@ -21,7 +21,8 @@ void put(std::string& out, T value) {
 
 std::string points_ply(const std::vector<MeasuredPoint>& points) {
   std::string out = fmt::format(
-      "ply\nformat binary_little_endian 1.0\ncomment moldloft, registered points of the surface shots\ncomment unit mm\n"
+      "ply\nformat binary_little_endian 1.0\ncomment moldloft, registered points of the surface "
+      "shots\ncomment unit mm\n"
       "comment frame world\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
       "property float residual\nproperty ushort shot\nproperty ushort stripe\nend_header\n",
       points.size());
@@ -38,7 +39,8 @@ std::string points_ply(const std::vector<MeasuredPoint>& points) {
 std::string boundary_ply(const geometry::BSplineSurface& surface, int points_per_side) {
   const int count = 4 * points_per_side;
   std::string out = fmt::format(
-      "ply\nformat binary_little_endian 1.0\ncomment moldloft, the plate's outline\ncomment unit mm\ncomment frame world\n"
+      "ply\nformat binary_little_endian 1.0\ncomment moldloft, the plate's outline\ncomment unit mm\ncomment "
+      "frame world\n"
       "element vertex {0}\nproperty double x\nproperty double y\nproperty double z\nelement edge {0}\n"
       "property int vertex1\nproperty int vertex2\nend_header\n",
       count);

@@ -25,10 +25,14 @@ double rounded(double mm) { return std::round(mm * 1e6) / 1e6; }
 
 std::string result_word(const Controller& c) {
   switch (c.cell().state()) {
-    case tasks::CellState::complete: return "complete";
-    case tasks::CellState::held: return "held";
-    case tasks::CellState::aborted: return "aborted";
-    default: return "stopped";
+    case tasks::CellState::complete:
+      return "complete";
+    case tasks::CellState::held:
+      return "held";
+    case tasks::CellState::aborted:
+      return "aborted";
+    default:
+      return "stopped";
   }
 }
 
@@ -64,7 +68,8 @@ Json summary_of(const Controller& c, const RunLabel& label) {
   j["points"] = {{"total", cell.points_seen()}, {"used", complete ? report.points_used : 0}};
   if (complete) {
     Json corners = Json::array();
-    for (const auto& corner : c.surface().outline().corners) corners.push_back({rounded(corner.x()), rounded(corner.y())});
+    for (const auto& corner : c.surface().outline().corners)
+      corners.push_back({rounded(corner.x()), rounded(corner.y())});
     j["boundary"] = {{"corners_mm", corners},
                      {"rms_mm", rounded(c.surface().outline().rms_mm)},
                      {"edge_points", cell.tracker().edge_points().size()}};
@@ -86,7 +91,8 @@ Json summary_of(const Controller& c, const RunLabel& label) {
   const auto memory = c.memory();
   j["memory"] = {{"plan_bytes", total_plan(memory)}, {"high_water_bytes", total_high_water(memory)}};
   Json parts = Json::object();
-  for (const auto& item : memory) parts[item.subsystem] = {{"plan_bytes", item.plan_bytes}, {"high_water_bytes", item.high_water_bytes}};
+  for (const auto& item : memory)
+    parts[item.subsystem] = {{"plan_bytes", item.plan_bytes}, {"high_water_bytes", item.high_water_bytes}};
   j["memory"]["subsystems"] = parts;
   j["recorder_lost"] = c.recorder().lost();
   return j;
@@ -99,7 +105,7 @@ Json surface_json(const geometry::BSplineSurface& s) {
     for (int k = 0; k < s.control_v(); ++k) row.push_back({s.x(i, k), s.y(i, k), s.z(i, k)});
     control.push_back(row);
   }
-  return {{"schema", 1}, {"unit", "mm"}, {"frame", "world"}, {"degree", {3, 3}},
+  return {{"schema", 1},          {"unit", "mm"},         {"frame", "world"},  {"degree", {3, 3}},
           {"knots_u", s.knots_u}, {"knots_v", s.knots_v}, {"control", control}};
 }
 
@@ -115,12 +121,22 @@ Json timing_of(const Controller& c) {
   j["slack"] = histogram_json(s.slack());
   j["frame_to_command"] = histogram_json(c.cell().frame_to_command());
   for (const auto& t : s.tasks()) {
-    j["tasks"].push_back({{"name", std::string{t.spec.name}}, {"period_ticks", t.spec.period_ticks}, {"budget_us", micros(t.spec.budget)},
-                          {"runs", t.runs}, {"late_starts", t.late_starts}, {"overruns", t.overruns}, {"cost", histogram_json(t.cost)}});
+    j["tasks"].push_back({{"name", std::string{t.spec.name}},
+                          {"period_ticks", t.spec.period_ticks},
+                          {"budget_us", micros(t.spec.budget)},
+                          {"runs", t.runs},
+                          {"late_starts", t.late_starts},
+                          {"overruns", t.overruns},
+                          {"cost", histogram_json(t.cost)}});
   }
   for (const auto& t : s.background()) {
-    j["background"].push_back({{"name", std::string{t.spec.name}}, {"quantum_us", micros(t.spec.quantum)}, {"runs", t.runs}, {"refused", t.refused},
-                               {"forced", t.forced}, {"overruns", t.overruns}, {"cost", histogram_json(t.cost)}});
+    j["background"].push_back({{"name", std::string{t.spec.name}},
+                               {"quantum_us", micros(t.spec.quantum)},
+                               {"runs", t.runs},
+                               {"refused", t.refused},
+                               {"forced", t.forced},
+                               {"overruns", t.overruns},
+                               {"cost", histogram_json(t.cost)}});
   }
   return j;
 }
@@ -134,7 +150,8 @@ std::expected<void, RunError> write_file(const std::filesystem::path& path, std:
   if (file) std::filesystem::rename(beside, path, failed);
   if (file && !failed) return {};
   std::filesystem::remove(beside, failed);
-  return std::unexpected{RunError{fmt::format("{}: cannot be written; is the disk full or read-only?", path.string())}};
+  return std::unexpected{
+      RunError{fmt::format("{}: cannot be written; is the disk full or read-only?", path.string())}};
 }
 
 namespace {
@@ -142,7 +159,8 @@ namespace {
 std::string events_jsonl(const std::vector<hal::EventRecord>& events) {
   std::string lines;
   for (const auto& e : events) {
-    Json j = {{"t_ms", std::chrono::duration<double, std::milli>(e.at).count()}, {"source", std::string{e.source.view()}}};
+    Json j = {{"t_ms", std::chrono::duration<double, std::milli>(e.at).count()},
+              {"source", std::string{e.source.view()}}};
     const auto put = [&](const char* key, std::string_view text) {
       if (!text.empty()) j[key] = std::string{text};
     };
@@ -155,16 +173,22 @@ std::string events_jsonl(const std::vector<hal::EventRecord>& events) {
   return lines;
 }
 
-std::string picture(const Controller& c, const RunLabel& label, const Json& summary, std::vector<PlateField> fields) {
+std::string picture(const Controller& c, const RunLabel& label, const Json& summary,
+                    std::vector<PlateField> fields) {
   OverviewInput in;
-  in.title = fmt::format("Moldloft run: {} {}", label.plate, label.seed ? fmt::format("(seed {})", *label.seed) : "");
-  in.subtitle = fmt::format("{}; {} boundary and {} surface shots, {} points used, {:.1f} s of cell time", summary["result"].get<std::string>(),
-                            summary["shots"]["boundary"].get<int>(), summary["shots"]["surface"].get<int>(),
-                            summary["points"]["used"].get<std::uint64_t>(), summary["cycle"]["seconds"].get<double>());
+  in.title = fmt::format("Moldloft run: {} {}", label.plate,
+                         label.seed ? fmt::format("(seed {})", *label.seed) : "");
+  in.subtitle =
+      fmt::format("{}; {} boundary and {} surface shots, {} points used, {:.1f} s of cell time",
+                  summary["result"].get<std::string>(), summary["shots"]["boundary"].get<int>(),
+                  summary["shots"]["surface"].get<int>(), summary["points"]["used"].get<std::uint64_t>(),
+                  summary["cycle"]["seconds"].get<double>());
   const bool complete = c.cell().state() == tasks::CellState::complete;
   if (complete) in.surface = &c.surface().fit().surface();
-  if (complete) in.corners = c.surface().outline().corners;
-  else in.corners = c.cell().tracker().corners();
+  if (complete)
+    in.corners = c.surface().outline().corners;
+  else
+    in.corners = c.cell().tracker().corners();
   in.edge_points = c.cell().tracker().edge_points();
   in.boundary_places = c.cell().boundary_places();
   in.surface_places = c.cell().surface_places();
@@ -176,7 +200,8 @@ std::string picture(const Controller& c, const RunLabel& label, const Json& summ
 
 }  // namespace
 
-std::expected<void, RunError> write_results(const Controller& c, const RunFolder& folder, const RunLabel& label, const Json& summary,
+std::expected<void, RunError> write_results(const Controller& c, const RunFolder& folder,
+                                            const RunLabel& label, const Json& summary,
                                             const std::optional<PlateField>& error_field) {
   std::expected<void, RunError> result;
   const auto write = [&](const char* name, std::string_view content) {
@@ -185,13 +210,15 @@ std::expected<void, RunError> write_results(const Controller& c, const RunFolder
   std::vector<PlateField> fields;
   if (c.cell().state() == tasks::CellState::complete) {
     const auto& surface = c.surface().fit().surface();
-    const double gate = gate_sigmas * std::max(c.surface().fit().report().sigma_mm, c.config().scanner.noise_mm);
+    const double gate =
+        gate_sigmas * std::max(c.surface().fit().report().sigma_mm, c.config().scanner.noise_mm);
     const auto points = measured_points(c, *folder.store, points_in_ply, gate);
     if (!points) return std::unexpected{RunError{points.error().what}};
     write("surface.json", surface_json(surface).dump() + "\n");
     write("boundary.ply", boundary_ply(surface, 100));
     write("points.ply", points_ply(*points));
-    fields = {shape_field(surface, picture_cells), error_field ? *error_field : residual_field(*points, picture_cells)};
+    fields = {shape_field(surface, picture_cells),
+              error_field ? *error_field : residual_field(*points, picture_cells)};
   }
   const auto events = folder.store->events();
   if (!events) return std::unexpected{RunError{events.error().what}};

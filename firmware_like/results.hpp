@@ -1,5 +1,6 @@
-// What a run leaves in its folder besides run.db: summary.json, boundary.ply, points.ply, surface.json, timing.json,
-// events.jsonl and overview.svg. Written after the cell has come to rest; every file states its unit.
+// What a run leaves in its folder besides run.db: summary.json, boundary.ply, points.ply, surface.json,
+// timing.json, events.jsonl and overview.svg. Written after the cell has come to rest; every file states its
+// unit.
 //
 // summary.json, surface.json and events.jsonl depend on the run alone, never on the machine: a simulated run with the
 // same seed gives the same bytes. What was measured in wall-clock time stands in timing.json.
@@ -34,7 +35,8 @@ Json timing_of(const Controller&);
 
 // Everything that can be written for the state that the run is in: a run that did not complete has no surface.
 // `error_field`, when given, is what the picture's second panel shows instead of the fit's residuals.
-std::expected<void, RunError> write_results(const Controller&, const RunFolder&, const RunLabel&, const Json& summary,
+std::expected<void, RunError> write_results(const Controller&, const RunFolder&, const RunLabel&,
+                                            const Json& summary,
                                             const std::optional<PlateField>& error_field = {});
 
 // Replaces a file as a whole: written beside it first, so that a full disk never leaves half a file.

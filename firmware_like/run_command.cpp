@@ -31,7 +31,8 @@ void on_interrupt(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
-// From before the first file is made to after the cell has come to rest: a ctrl-C in between never leaves half of either.
+// From before the first file is made to after the cell has come to rest: a ctrl-C in between never leaves
+// half of either.
 class InterruptGuard {
  public:
   InterruptGuard() {
@@ -56,8 +57,10 @@ class InterruptGuard {
 
 std::string memory_line(const Controller& controller) {
   std::string line = "memory plan:";
-  for (const auto& item : controller.memory()) line += fmt::format(" {} {:.1f} MiB,", item.subsystem, static_cast<double>(item.plan_bytes) / (1 << 20));
-  return line + fmt::format(" {:.1f} MiB in all", static_cast<double>(total_plan(controller.memory())) / (1 << 20));
+  for (const auto& item : controller.memory())
+    line += fmt::format(" {} {:.1f} MiB,", item.subsystem, static_cast<double>(item.plan_bytes) / (1 << 20));
+  return line +
+         fmt::format(" {:.1f} MiB in all", static_cast<double>(total_plan(controller.memory())) / (1 << 20));
 }
 
 // One line for a run that did not complete: what happened, what is saved where, how to go on.
@@ -66,17 +69,21 @@ std::string how_it_ended(const Controller& controller, const RunOptions& options
   const std::string state = cell.state() == tasks::CellState::held      ? "held: "
                             : cell.state() == tasks::CellState::aborted ? "aborted: "
                                                                         : "stopped: ";
-  const std::string what = state + (cell.state() == tasks::CellState::stopped ? "the arm stands" : std::string{cell.why().view()});
+  const std::string what =
+      state + (cell.state() == tasks::CellState::stopped ? "the arm stands" : std::string{cell.why().view()});
   if (cell.cause() == tasks::HoldCause::measurement && cell.state() != tasks::CellState::stopped) {
-    return fmt::format("{}. What was measured is saved in {} (overview.svg shows it); then begin a new run", what, folder);
+    return fmt::format("{}. What was measured is saved in {} (overview.svg shows it); then begin a new run",
+                       what, folder);
   }
-  return fmt::format("{}. Everything so far is saved; to go on: moldloft run {} --out {} --resume", what, options.config_path, folder);
+  return fmt::format("{}. Everything so far is saved; to go on: moldloft run {} --out {} --resume", what,
+                     options.config_path, folder);
 }
 
 // The same for a run that ended before the arm was sent anywhere: nothing was measured, nothing is kept.
 std::string why_refused(const Controller& controller) {
   const auto& cell = controller.cell();
-  if (cell.state() == tasks::CellState::stopped) return "stopped before anything was measured; nothing is kept";
+  if (cell.state() == tasks::CellState::stopped)
+    return "stopped before anything was measured; nothing is kept";
   return fmt::format("{}; nothing was measured", cell.why().view());
 }
 
@@ -90,37 +97,50 @@ std::uint32_t fresh_epoch() {
 
 int exit_code(const Controller& controller) {
   switch (controller.cell().state()) {
-    case tasks::CellState::complete: return exit_done;
-    case tasks::CellState::held: return exit_held;
-    case tasks::CellState::aborted: return exit_aborted;
-    default: return exit_stopped;
+    case tasks::CellState::complete:
+      return exit_done;
+    case tasks::CellState::held:
+      return exit_held;
+    case tasks::CellState::aborted:
+      return exit_aborted;
+    default:
+      return exit_stopped;
   }
 }
 
 std::string result_table(const Json& s, const std::string& folder) {
   std::string t = fmt::format("\n{:<28}{}\n", "result", s["result"].get<std::string>());
-  const auto row = [&](std::string_view name, const std::string& value) { t += fmt::format("{:<28}{}\n", name, value); };
+  const auto row = [&](std::string_view name, const std::string& value) {
+    t += fmt::format("{:<28}{}\n", name, value);
+  };
   const auto& shots = s["shots"];
-  row("shots", fmt::format("{} seeking, {} boundary, {} surface, {} retaken", shots["seek"].get<int>(), shots["boundary"].get<int>(),
-                           shots["surface"].get<int>(), shots["retaken"].get<int>()));
+  row("shots",
+      fmt::format("{} seeking, {} boundary, {} surface, {} retaken", shots["seek"].get<int>(),
+                  shots["boundary"].get<int>(), shots["surface"].get<int>(), shots["retaken"].get<int>()));
   if (s.contains("surface")) {
-    row("points used", fmt::format("{} of {}", s["points"]["used"].get<std::uint64_t>(), s["points"]["total"].get<std::uint64_t>()));
+    row("points used", fmt::format("{} of {}", s["points"]["used"].get<std::uint64_t>(),
+                                   s["points"]["total"].get<std::uint64_t>()));
     std::string corners;
-    for (const auto& c : s["boundary"]["corners_mm"]) corners += fmt::format("({:.2f}, {:.2f}) ", c[0].get<double>(), c[1].get<double>());
+    for (const auto& c : s["boundary"]["corners_mm"])
+      corners += fmt::format("({:.2f}, {:.2f}) ", c[0].get<double>(), c[1].get<double>());
     row("corners, mm", corners);
     const auto& surface = s["surface"];
-    row("surface", fmt::format("{} x {} control points", surface["control_points"][0].get<int>(), surface["control_points"][1].get<int>()));
+    row("surface", fmt::format("{} x {} control points", surface["control_points"][0].get<int>(),
+                               surface["control_points"][1].get<int>()));
     row("noise of a point, mm", fmt::format("{:.4f}", surface["sigma_mm"].get<double>()));
     row("shot heights, rms, mm", fmt::format("{:.4f}", surface["shot_offset_rms_mm"].get<double>()));
   }
   const auto& cycle = s["cycle"];
-  row("cell time, s", fmt::format("{:.1f} (arm standing {:.0f} %, idle {:.1f} %)", cycle["seconds"].get<double>(),
-                                  100 * cycle["standing_fraction"].get<double>(), 100 * cycle["idle_fraction"].get<double>()));
+  row("cell time, s",
+      fmt::format("{:.1f} (arm standing {:.0f} %, idle {:.1f} %)", cycle["seconds"].get<double>(),
+                  100 * cycle["standing_fraction"].get<double>(),
+                  100 * cycle["idle_fraction"].get<double>()));
   if (s.contains("truth")) {
     const auto& truth = s["truth"];
-    row("against the truth, mm", fmt::format("normal rms {:.4f}, max {:.4f}; outline max {:.3f}; corner max {:.3f}",
-                                             truth["normal_rms_mm"].get<double>(), truth["normal_max_mm"].get<double>(),
-                                             truth["outline_max_mm"].get<double>(), truth["corner_max_mm"].get<double>()));
+    row("against the truth, mm",
+        fmt::format("normal rms {:.4f}, max {:.4f}; outline max {:.3f}; corner max {:.3f}",
+                    truth["normal_rms_mm"].get<double>(), truth["normal_max_mm"].get<double>(),
+                    truth["outline_max_mm"].get<double>(), truth["corner_max_mm"].get<double>()));
   }
   row("run folder", folder);
   return t;
@@ -129,17 +149,21 @@ std::string result_table(const Json& s, const std::string& folder) {
 int run_cell(const RunOptions& options) {
   const auto config = load_config(options.config_path);
   if (!config) return complain(config.error().what);
-  const std::filesystem::path out = options.out.empty() ? default_run_path() : std::filesystem::path{options.out};
+  const std::filesystem::path out =
+      options.out.empty() ? default_run_path() : std::filesystem::path{options.out};
   if (options.resume && options.out.empty()) return complain("--resume: give the run's folder with --out");
   InterruptGuard guard;
-  auto folder = options.resume ? resume_run(out, config->text) : create_run(out, config->text, RunKind::measured);
+  auto folder =
+      options.resume ? resume_run(out, config->text) : create_run(out, config->text, RunKind::measured);
   if (!folder) return complain(folder.error().what);
 
   hal::SteadyClock clock;
-  const auto scanner_link = hal::make_tcp_link(config->scanner.host, static_cast<std::uint16_t>(config->scanner.port));
+  const auto scanner_link =
+      hal::make_tcp_link(config->scanner.host, static_cast<std::uint16_t>(config->scanner.port));
   const auto robot_link = hal::make_serial_link(config->robot.device, config->robot.baud);
-  const auto controller = std::make_unique<Controller>(*config, clock, *scanner_link, *robot_link,
-                                                       ControllerOptions{.archive = folder->archive.get(), .epoch = fresh_epoch()});
+  const auto controller = std::make_unique<Controller>(
+      *config, clock, *scanner_link, *robot_link,
+      ControllerOptions{.archive = folder->archive.get(), .epoch = fresh_epoch()});
   guard.stops(controller->cell());
   {
     const RecorderThread recorder{controller->recorder(), *folder->store};
@@ -156,8 +180,11 @@ int run_cell(const RunOptions& options) {
   }
   const RunLabel label{.plate = config->name, .seed = {}};
   const Json summary = summary_of(*controller, label);
-  if (controller->recorder().store_failed()) complain(fmt::format("{}; what came after that is not saved", controller->recorder().store_error().view()));
-  if (const auto written = write_results(*controller, *folder, label, summary); !written) return complain(written.error().what);
+  if (controller->recorder().store_failed())
+    complain(
+        fmt::format("{}; what came after that is not saved", controller->recorder().store_error().view()));
+  if (const auto written = write_results(*controller, *folder, label, summary); !written)
+    return complain(written.error().what);
   if (code != exit_done) return complain(how_it_ended(*controller, options, out.string())), code;
   fmt::print("{}", result_table(summary, out.string()));
   return controller->recorder().store_failed() ? exit_failed : exit_done;
@@ -173,8 +200,9 @@ int fit_run(const FitOptions& options) {
 
   hal::VirtualClock clock;
   hal::Cable none{clock, {}};  // no devices: nothing is ever sent
-  const auto controller = std::make_unique<Controller>(*config, clock, none.host(), none.host(),
-                                                       ControllerOptions{.archive = run->archive.get(), .devices = false});
+  const auto controller =
+      std::make_unique<Controller>(*config, clock, none.host(), none.host(),
+                                   ControllerOptions{.archive = run->archive.get(), .devices = false});
   controller->start();
   while (controller->tick()) {
   }
@@ -188,8 +216,10 @@ int fit_run(const FitOptions& options) {
   std::filesystem::create_directories(options.out, failed);
   if (failed) return complain(fmt::format("{}: cannot be created ({})", options.out, failed.message()));
   RunFolder results{options.out, std::move(run->store), nullptr};
-  if (const auto written = write_results(*controller, results, label, summary); !written) return complain(written.error().what);
-  if (const int code = exit_code(*controller); code != exit_done) return complain(controller->cell().why().view()), code;
+  if (const auto written = write_results(*controller, results, label, summary); !written)
+    return complain(written.error().what);
+  if (const int code = exit_code(*controller); code != exit_done)
+    return complain(controller->cell().why().view()), code;
   fmt::print("{}", result_table(summary, options.out));
   return exit_done;
 }

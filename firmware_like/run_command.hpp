@@ -10,8 +10,8 @@ namespace moldloft::firmware_like {
 
 enum ExitCode : int {
   exit_done = 0,
-  exit_failed = 1,   // nothing was begun, or a file could not be written
-  exit_held = 2,     // the cell holds for a person
+  exit_failed = 1,  // nothing was begun, or a file could not be written
+  exit_held = 2,    // the cell holds for a person
   exit_aborted = 3,
   exit_stopped = 4,  // by ctrl-C
 };

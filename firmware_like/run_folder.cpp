@@ -35,19 +35,24 @@ std::expected<void, RunError> remove_simulated(const fs::path& folder) {
 
 }  // namespace
 
-std::expected<RunFolder, RunError> create_run(const fs::path& path, const std::string& config_text, RunKind kind) {
+std::expected<RunFolder, RunError> create_run(const fs::path& path, const std::string& config_text,
+                                              RunKind kind) {
   std::error_code failed;
   const bool made_folder = fs::create_directories(path, failed);
-  if (failed) return error(fmt::format("{}: cannot be created ({}); give another --out", path.string(), failed.message()));
+  if (failed)
+    return error(
+        fmt::format("{}: cannot be created ({}); give another --out", path.string(), failed.message()));
   if (fs::exists(store_path(path))) {
     if (kind != RunKind::simulated) {
-      return error(fmt::format("{}: holds a run already; give another --out, or --resume to go on with it", path.string()));
+      return error(fmt::format("{}: holds a run already; give another --out, or --resume to go on with it",
+                               path.string()));
     }
     if (auto removed = remove_simulated(path); !removed) return std::unexpected{removed.error()};
   }
   auto store = hal::RunStore::open(store_path(path), hal::RunStore::Mode::create);
   if (!store) return error(store.error().what);
-  for (const auto& [key, value] : {std::pair<std::string, std::string>{"kind", kind_name(kind)}, {"config", config_text}}) {
+  for (const auto& [key, value] :
+       {std::pair<std::string, std::string>{"kind", kind_name(kind)}, {"config", config_text}}) {
     if (auto written = store->set_meta(key, value); !written) return error(written.error().what);
   }
   return RunFolder{path, std::make_unique<hal::RunStore>(std::move(*store)), nullptr, made_folder};
@@ -67,9 +72,11 @@ std::expected<RunFolder, RunError> resume_run(const fs::path& path, const std::s
   if (!config) return error(config.error().what);
   // The stored shots lead to the same places only if everything that places are computed from is as it was.
   if (const std::string key = first_difference(*config, config_text); !key.empty()) {
-    return error(fmt::format("{}: was begun with another configuration ('{}' differs); resume it with the same, or begin a new run with "
-                             "another --out",
-                             path.string(), key));
+    return error(
+        fmt::format("{}: was begun with another configuration ('{}' differs); resume it with the same, or "
+                    "begin a new run with "
+                    "another --out",
+                    path.string(), key));
   }
   auto store = hal::RunStore::open(store_path(path), hal::RunStore::Mode::append);
   if (!store) return error(store.error().what);
@@ -85,7 +92,8 @@ std::expected<RunFolder, RunError> open_run(const fs::path& path) {
   if (!store) return error(store.error().what);
   auto shots = StoredShots::load(*store);
   if (!shots) return error(shots.error().what);
-  return RunFolder{path, std::make_unique<hal::RunStore>(std::move(*store)), std::make_unique<StoredShots>(std::move(*shots))};
+  return RunFolder{path, std::make_unique<hal::RunStore>(std::move(*store)),
+                   std::make_unique<StoredShots>(std::move(*shots))};
 }
 
 fs::path default_run_path() {

@@ -28,12 +28,13 @@ struct RunFolder {
 
 enum class RunKind { measured, simulated };
 
-std::expected<RunFolder, RunError> create_run(const std::filesystem::path&, const std::string& config_text, RunKind);
+std::expected<RunFolder, RunError> create_run(const std::filesystem::path&, const std::string& config_text,
+                                              RunKind);
 std::expected<RunFolder, RunError> resume_run(const std::filesystem::path&, const std::string& config_text);
 std::expected<RunFolder, RunError> open_run(const std::filesystem::path&);  // to read only
 
-// Takes a run away that was refused before anything was measured, so that it does not block the next try: its store, and
-// the folder if it was made for it and holds nothing else.
+// Takes a run away that was refused before anything was measured, so that it does not block the next try: its
+// store, and the folder if it was made for it and holds nothing else.
 void discard_run(RunFolder);
 
 std::filesystem::path default_run_path();  // out/run-YYYYmmdd-HHMMSS

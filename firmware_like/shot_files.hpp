@@ -1,5 +1,5 @@
-// The shots of a run store, in memory, as an archive for the cell: what --resume and `moldloft fit` go through first.
-// Memory: 650 kB a shot of 50,000 points; loaded before the first tick.
+// The shots of a run store, in memory, as an archive for the cell: what --resume and `moldloft fit` go
+// through first. Memory: 650 kB a shot of 50,000 points; loaded before the first tick.
 #pragma once
 
 #include <map>

@@ -8,7 +8,8 @@
 
 namespace moldloft::firmware_like {
 
-TomlSection::TomlSection(const toml::table* table, std::string name, std::string path, std::optional<std::string>& error)
+TomlSection::TomlSection(const toml::table* table, std::string name, std::string path,
+                         std::optional<std::string>& error)
     : table_{table}, name_{std::move(name)}, path_{std::move(path)}, error_{error} {}
 
 const toml::node* TomlSection::node(std::string_view key) {
@@ -27,7 +28,8 @@ void TomlSection::number(std::string_view key, double& value, double min, double
   if (n == nullptr) return;
   const auto v = n->value<double>();
   if (!v || !n->is_number()) return wrong(*n, key, "a number is wanted");
-  if (!std::isfinite(*v) || *v < min || *v > max) return wrong(*n, key, fmt::format("{} is outside {} to {}", *v, min, max));
+  if (!std::isfinite(*v) || *v < min || *v > max)
+    return wrong(*n, key, fmt::format("{} is outside {} to {}", *v, min, max));
   value = *v;
 }
 
@@ -65,8 +67,10 @@ void TomlSection::numbers(std::string_view key, std::span<double> values, double
   }
   for (std::size_t i = 0; i < values.size(); ++i) {
     const auto v = array->get(i)->value<double>();
-    if (!v || !array->get(i)->is_number()) return wrong(*n, key, fmt::format("an array of {} numbers is wanted", values.size()));
-    if (!std::isfinite(*v) || *v < min || *v > max) return wrong(*n, key, fmt::format("{} is outside {} to {}", *v, min, max));
+    if (!v || !array->get(i)->is_number())
+      return wrong(*n, key, fmt::format("an array of {} numbers is wanted", values.size()));
+    if (!std::isfinite(*v) || *v < min || *v > max)
+      return wrong(*n, key, fmt::format("{} is outside {} to {}", *v, min, max));
     values[i] = *v;
   }
 }
@@ -74,7 +78,8 @@ void TomlSection::numbers(std::string_view key, std::span<double> values, double
 void TomlSection::range(std::string_view key, std::array<double, 2>& values, double min, double max) {
   numbers(key, values, min, max);
   if (const toml::node* n = node(key); n != nullptr && values[0] > values[1]) {
-    wrong(*n, key, fmt::format("from {} to {} is no range: the smaller number comes first", values[0], values[1]));
+    wrong(*n, key,
+          fmt::format("from {} to {} is no range: the smaller number comes first", values[0], values[1]));
   }
 }
 

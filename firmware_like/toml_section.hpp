@@ -1,16 +1,16 @@
-// One table of a TOML file, read key by key: each getter notes the first thing that is wrong, finish() also notes keys
-// that nobody asked for. Values keep their defaults where the key is absent.
+// One table of a TOML file, read key by key: each getter notes the first thing that is wrong, finish() also
+// notes keys that nobody asked for. Values keep their defaults where the key is absent.
 //
 // Setup time only: allocates. The first error of a file wins and is reported with its line.
 #pragma once
 
+#include <toml++/toml.h>
 #include <array>
 #include <optional>
 #include <set>
 #include <span>
 #include <string>
 #include <string_view>
-#include <toml++/toml.h>
 #include <vector>
 
 namespace moldloft::firmware_like {
@@ -18,15 +18,18 @@ namespace moldloft::firmware_like {
 class TomlSection {
  public:
   // `table` may be null: then every key is absent. `error` is shared by all sections of a file.
-  TomlSection(const toml::table* table, std::string name, std::string path, std::optional<std::string>& error);
+  TomlSection(const toml::table* table, std::string name, std::string path,
+              std::optional<std::string>& error);
   ~TomlSection() = default;
 
   void number(std::string_view key, double& value, double min, double max);
   void integer(std::string_view key, int& value, int min, int max);
   void text(std::string_view key, std::string& value);
   void choice(std::string_view key, std::string& value, const std::vector<std::string>& allowed);
-  void numbers(std::string_view key, std::span<double> values, double min, double max);  // an array of that length
-  void range(std::string_view key, std::array<double, 2>& values, double min, double max);  // the smaller number first
+  void numbers(std::string_view key, std::span<double> values, double min,
+               double max);  // an array of that length
+  void range(std::string_view key, std::array<double, 2>& values, double min,
+             double max);  // the smaller number first
   TomlSection section(std::string_view key);
   void finish();  // unknown keys are an error
 

@@ -1,4 +1,5 @@
-// Bernstein polynomials of the two degrees that the surface fit lives on: cubics, and sextics for their products.
+// Bernstein polynomials of the two degrees that the surface fit lives on: cubics, and sextics for their
+// products.
 //
 // Accuracy     sums of nonnegative terms throughout: nothing cancels on [0, 1]
 // Cost         constant

@@ -1,5 +1,6 @@
-// What one shot shows of the plate's boundary: its edge points in order, counter-clockwise about the plate (the plate
-// on the left), cut into pieces where the boundary runs out of the field, and what each piece is: a side or a corner.
+// What one shot shows of the plate's boundary: its edge points in order, counter-clockwise about the plate
+// (the plate on the left), cut into pieces where the boundary runs out of the field, and what each piece is:
+// a side or a corner.
 //
 // A region's boundary goes along the lower ends of its runs with the stripes ascending and back along the upper ends.
 // Where the region begins or ends with a stripe inside the field, the boundary lies hidden between two parallel

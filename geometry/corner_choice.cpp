@@ -123,8 +123,10 @@ std::optional<CornerChoice::Corner> CornerChoice::examine(const Vector2d& candid
     corner.turn = std::numbers::pi - std::acos(std::clamp(to_a.dot(to_b), -1.0, 1.0));
     corner.rms_mm = std::hypot(a.rms, b.rms);
     if (corner.turn < settings_.min_turn) return std::nullopt;
-    corner.position = a.mean + cross(b.mean - a.mean, b.direction) / cross(a.direction, b.direction) * a.direction;
-    if (!corner.position.allFinite() || (corner.position - candidate).norm() > settings_.ring_outer_mm) return std::nullopt;
+    corner.position =
+        a.mean + cross(b.mean - a.mean, b.direction) / cross(a.direction, b.direction) * a.direction;
+    if (!corner.position.allFinite() || (corner.position - candidate).norm() > settings_.ring_outer_mm)
+      return std::nullopt;
   }
   return corner;
 }
@@ -147,7 +149,9 @@ std::expected<void, Error> CornerChoice::arrange() {
     const Vector2d a = p.position - middle, b = q.position - middle;
     return std::atan2(a.y(), a.x()) < std::atan2(b.y(), b.x());
   });
-  const auto side = [&](std::size_t i) { return (chosen_[(i + 1) % 4].position - chosen_[i % 4].position).norm(); };
+  const auto side = [&](std::size_t i) {
+    return (chosen_[(i + 1) % 4].position - chosen_[i % 4].position).norm();
+  };
   const std::size_t first = side(0) + side(2) >= side(1) + side(3) ? 0 : 1;
   for (std::size_t i = 0; i < 4; ++i) corners_[i] = chosen_[(first + i) % 4].position;
   return {};

@@ -1,4 +1,5 @@
-// Lines through edge points in plan view: robust fits, false points, and the split of a bent stretch into two lines.
+// Lines through edge points in plan view: robust fits, false points, and the split of a bent stretch into two
+// lines.
 //
 // Units        mm, plan view (x, y) of the edge points
 // Cost         fit_edge_line O(n) a pass, five passes; best_split O(n); is_false_point constant

@@ -328,7 +328,8 @@ struct Neighbour {
 
 // A stripe that reports every ray ends at the field's limit whatever the plate's height does to its width there;
 // one that leaves missing points out ends there by its position.
-bool at_field_limit(double y_outward, std::size_t rays_beyond, double spacing, const PlateRunSettings& settings) {
+bool at_field_limit(double y_outward, std::size_t rays_beyond, double spacing,
+                    const PlateRunSettings& settings) {
   return static_cast<double>(rays_beyond) * spacing <= settings.field_margin_mm ||
          y_outward >= settings.field_half_y_mm - settings.field_margin_mm;
 }
@@ -366,7 +367,8 @@ std::expected<void, Error> PlateRunFinder::begin(std::span<const StripeView> str
   return {};
 }
 
-std::expected<bool, Error> PlateRunFinder::cut_stripes(std::size_t at_most, const PlateRunSettings& settings) {
+std::expected<bool, Error> PlateRunFinder::cut_stripes(std::size_t at_most,
+                                                       const PlateRunSettings& settings) {
   const std::size_t end = std::min(stripes_.size(), next_stripe_ + at_most);
   for (; next_stripe_ < end; ++next_stripe_) {
     const StripeView& stripe = stripes_[next_stripe_];
@@ -411,12 +413,14 @@ std::expected<std::span<const PlateRun>, Error> PlateRunFinder::finish(const Eig
     };
     const bool below = i > first_run_[run.stripe], above = i + 1 < first_run_[run.stripe + 1u];
     const std::size_t rays_above = stripe.z.size() - 1 - out.last;
-    const bool low_limit = at_field_limit(-run.y_first, out.first, spacing_near_end(stripe, good, false), settings);
-    const bool high_limit = at_field_limit(run.y_last, rays_above, spacing_near_end(stripe, good, true), settings);
+    const bool low_limit =
+        at_field_limit(-run.y_first, out.first, spacing_near_end(stripe, good, false), settings);
+    const bool high_limit =
+        at_field_limit(run.y_last, rays_above, spacing_near_end(stripe, good, true), settings);
     out.at_first = low_limit ? RunEnd::field_limit
                              : kind_of_end(below ? neighbour(i - 1, false) : Neighbour{}, settings);
-    out.at_last =
-        high_limit ? RunEnd::field_limit : kind_of_end(above ? neighbour(i + 1, true) : Neighbour{}, settings);
+    out.at_last = high_limit ? RunEnd::field_limit
+                             : kind_of_end(above ? neighbour(i + 1, true) : Neighbour{}, settings);
     found_.push_back(out);
   }
   return std::span<const PlateRun>(found_);

@@ -71,7 +71,8 @@ class PlateRunFinder {
   // the caller's and must stay until then.
   std::expected<void, Error> begin(std::span<const StripeView> stripes);
   std::expected<bool, Error> cut_stripes(std::size_t at_most, const PlateRunSettings& settings);
-  std::expected<std::span<const PlateRun>, Error> finish(const Eigen::Vector3d& hint, const PlateRunSettings& settings);
+  std::expected<std::span<const PlateRun>, Error> finish(const Eigen::Vector3d& hint,
+                                                         const PlateRunSettings& settings);
 
   std::size_t bytes() const;
 

@@ -1,4 +1,5 @@
-// A net of bicubic B-splines over equal spans, seen cell by cell: how Bernstein moments become normal equations.
+// A net of bicubic B-splines over equal spans, seen cell by cell: how Bernstein moments become normal
+// equations.
 //
 // On a cell 4 x 4 basis functions live. Each is a bicubic in Bernstein form (Bezier extraction), so a product of two
 // is a bisextic, and every entry of the cell's 16 x 16 Gram matrix is a fixed combination of its 7 x 7 moments.

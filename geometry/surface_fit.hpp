@@ -1,5 +1,5 @@
-// The streaming surface fit: points are folded into Bernstein moments cell by cell and forgotten; nets of 2^k by 2^l
-// spans come out of the same pass; generalized cross-validation picks one.
+// The streaming surface fit: points are folded into Bernstein moments cell by cell and forgotten; nets of 2^k
+// by 2^l spans come out of the same pass; generalized cross-validation picks one.
 //
 // Model        z(u, v) = sum N_i(u) M_j(v) z_ij + d_s, with d_s the unknown height error of shot s (robot
 //              repeatability), a zero-mean random effect with standard deviation shot_sigma_mm: overlapping shots and
@@ -30,8 +30,8 @@ struct SurfaceFitSettings {
   // The coarsest net is taken that misses no more than this (rms) of what the best net explains. Errors of pose in the
   // plane look like steps of height where the plate slopes; below a few micrometres a finer net follows those.
   double tolerance_mm = 0.005;
-  double noise_mm = 0;           // of a point of weight 1; 0: estimated from the finest net's residual
-  double fairing = 1e-5;         // relative to the data: the ratio of the matrices' traces
+  double noise_mm = 0;    // of a point of weight 1; 0: estimated from the finest net's residual
+  double fairing = 1e-5;  // relative to the data: the ratio of the matrices' traces
 };
 
 struct SurfaceFitReport {

@@ -99,12 +99,15 @@ std::size_t encode(std::uint32_t request_id, const HelloRequest&, std::span<std:
 std::size_t encode(std::uint32_t request_id, const HelloReply&, std::span<std::byte> out) noexcept;
 std::size_t encode(std::uint32_t request_id, const Config&, std::span<std::byte> out) noexcept;
 std::size_t encode(std::uint32_t request_id, const Trigger&, std::span<std::byte> out) noexcept;
-std::size_t encode(std::uint32_t request_id, const Exposed&, std::uint64_t acquired_ns, std::span<std::byte> out) noexcept;
+std::size_t encode(std::uint32_t request_id, const Exposed&, std::uint64_t acquired_ns,
+                   std::span<std::byte> out) noexcept;
 std::size_t encode(std::uint32_t request_id, const StatusReply&, std::span<std::byte> out) noexcept;
 std::size_t encode(std::uint32_t request_id, const ErrorReply&, std::span<std::byte> out) noexcept;
-std::size_t encode_empty(std::uint32_t request_id, Type, std::span<std::byte> out) noexcept;  // PING, RESET, STATUS request
+std::size_t encode_empty(std::uint32_t request_id, Type,
+                         std::span<std::byte> out) noexcept;  // PING, RESET, STATUS request
 
-// A frame as it goes over the wire. int16 takes scale and offset from the extent that `field` gives (+-x, +-y, +-depth).
+// A frame as it goes over the wire. int16 takes scale and offset from the extent that `field` gives (+-x,
+// +-y, +-depth).
 std::size_t encoded_frame_size(const Frame&, Encoding, bool intensity) noexcept;
 std::size_t encode_frame(std::uint32_t request_id, const Frame&, Encoding, bool intensity,
                          const std::array<float, 3>& half_extent_mm, std::span<std::byte> out) noexcept;

@@ -1,5 +1,5 @@
-// The robot's wire: ASCII lines with a number and a Fletcher-16 checksum, as pure functions on text. The specification
-// is PROTOCOLS.md; this is its code.
+// The robot's wire: ASCII lines with a number and a Fletcher-16 checksum, as pure functions on text. The
+// specification is PROTOCOLS.md; this is its code.
 //
 //     >0123 MOV 412.350 -88.120 155.000 0.000 180.000 35.000 50 *31910       host to robot
 //     <0123 DON 412.348 -88.121 155.001 0.001 180.000 34.998 *31027          robot to host

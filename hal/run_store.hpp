@@ -1,5 +1,5 @@
-// The run store: one SQLite file that holds everything of a run as it happened, so that it can be replayed, fitted
-// again or resumed.
+// The run store: one SQLite file that holds everything of a run as it happened, so that it can be replayed,
+// fitted again or resumed.
 //
 // Tables: meta(key, value), link_bytes(link, direction, offset, t_ns, bytes), events(seq, t_ns, source, event,
 // from_state, to_state, text), shots(shot_id, t_ns, purpose, attempts, commanded and reported pose, payload_offset,
@@ -48,7 +48,8 @@ class RunStore {
   std::expected<std::string, StoreError> meta(std::string_view key) const;
   std::expected<std::vector<ShotRecord>, StoreError> shots() const;
   std::expected<std::vector<EventRecord>, StoreError> events() const;
-  std::expected<std::vector<std::byte>, StoreError> bytes(LinkId, Direction, std::uint64_t offset, std::uint64_t size) const;
+  std::expected<std::vector<std::byte>, StoreError> bytes(LinkId, Direction, std::uint64_t offset,
+                                                          std::uint64_t size) const;
   std::expected<Frame, StoreError> frame(const ShotRecord&) const;  // decoded from the bytes as they came
 
  private:

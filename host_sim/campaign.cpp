@@ -20,7 +20,8 @@ namespace {
 using firmware_like::Json;
 
 // What every plate of the standard campaign must keep to (README, "What it reaches").
-constexpr double max_normal_rms_mm = 0.02, max_normal_max_mm = 0.08, max_outline_mm = 0.3, max_corner_mm = 0.3;
+constexpr double max_normal_rms_mm = 0.02, max_normal_max_mm = 0.08, max_outline_mm = 0.3,
+                 max_corner_mm = 0.3;
 
 struct Job {
   std::string plate;
@@ -63,10 +64,13 @@ std::vector<Job> jobs_for(const CampaignOptions& options) {
   return jobs;
 }
 
-double number(const Json& truth, const char* key) { return truth.contains(key) ? truth[key].get<double>() : 0; }
+double number(const Json& truth, const char* key) {
+  return truth.contains(key) ? truth[key].get<double>() : 0;
+}
 
 bool within_limits(const Json& truth) {
-  return number(truth, "normal_rms_mm") <= max_normal_rms_mm && number(truth, "normal_max_mm") <= max_normal_max_mm &&
+  return number(truth, "normal_rms_mm") <= max_normal_rms_mm &&
+         number(truth, "normal_max_mm") <= max_normal_max_mm &&
          number(truth, "outline_max_mm") <= max_outline_mm && number(truth, "corner_max_mm") <= max_corner_mm;
 }
 
@@ -97,22 +101,27 @@ void print_row(const Row& r) {
     fmt::print("  {}\n", r.message);
     return;
   }
-  fmt::print("{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}{}\n", number(r.truth, "normal_rms_mm"), number(r.truth, "normal_max_mm"),
-             number(r.truth, "outline_max_mm"), number(r.truth, "corner_max_mm"), r.good ? "" : "  beyond the limits");
+  fmt::print("{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}{}\n", number(r.truth, "normal_rms_mm"),
+             number(r.truth, "normal_max_mm"), number(r.truth, "outline_max_mm"),
+             number(r.truth, "corner_max_mm"), r.good ? "" : "  beyond the limits");
 }
 
 void print_summary(const std::vector<Row>& rows) {
-  const auto complete = std::count_if(rows.begin(), rows.end(), [](const Row& r) { return r.result == "complete"; });
+  const auto complete =
+      std::count_if(rows.begin(), rows.end(), [](const Row& r) { return r.result == "complete"; });
   const auto good = std::count_if(rows.begin(), rows.end(), [](const Row& r) { return r.good; });
   fmt::print("{} runs, {} complete, {} within the limits\n", rows.size(), complete, good);
-  for (const auto& [key, limit] : {std::pair{"normal_rms_mm", max_normal_rms_mm}, {"normal_max_mm", max_normal_max_mm},
-                                   {"outline_max_mm", max_outline_mm}, {"corner_max_mm", max_corner_mm}}) {
+  for (const auto& [key, limit] : {std::pair{"normal_rms_mm", max_normal_rms_mm},
+                                   {"normal_max_mm", max_normal_max_mm},
+                                   {"outline_max_mm", max_outline_mm},
+                                   {"corner_max_mm", max_corner_mm}}) {
     double worst = 0, sum = 0;
     for (const auto& r : rows) {
       worst = std::max(worst, number(r.truth, key));
       sum += number(r.truth, key);
     }
-    fmt::print("{:<16} mean {:>8.4f}  worst {:>8.4f}  limit {:>6.2f}\n", key, sum / static_cast<double>(std::max<std::ptrdiff_t>(complete, 1)), worst, limit);
+    fmt::print("{:<16} mean {:>8.4f}  worst {:>8.4f}  limit {:>6.2f}\n", key,
+               sum / static_cast<double>(std::max<std::ptrdiff_t>(complete, 1)), worst, limit);
   }
 }
 
@@ -121,20 +130,24 @@ void print_summary(const std::vector<Row>& rows) {
 int run_campaign(const CampaignOptions& options) {
   const auto jobs = jobs_for(options);
   if (jobs.empty()) {
-    fmt::print(stderr, "moldloft-sim campaign: nothing to run; --plates all or one of {}; --outlines all or one of {}; --seeds A..B\n",
+    fmt::print(stderr,
+               "moldloft-sim campaign: nothing to run; --plates all or one of {}; --outlines all or one of "
+               "{}; --seeds A..B\n",
                fmt::join(shape_names(), ", "), fmt::join(outline_names(), ", "));
     return 1;
   }
   const bool keep = !options.out.empty();
   const std::filesystem::path root =
-      keep ? std::filesystem::path{options.out} : std::filesystem::temp_directory_path() / fmt::format("moldloft-campaign-{}", ::getpid());
+      keep ? std::filesystem::path{options.out}
+           : std::filesystem::temp_directory_path() / fmt::format("moldloft-campaign-{}", ::getpid());
   std::vector<Row> rows(jobs.size());
   std::vector<bool> ready(jobs.size(), false);
   std::atomic<std::size_t> next{0};
   std::mutex printing;
   std::size_t printed = 0;
   if (!options.json) {
-    fmt::print("{:<10}{:<15}{:>5}  {:<10}{:>10}{:>10}{:>10}{:>10}\n", "plate", "outline", "seed", "result", "rms mm", "max mm", "outline", "corner");
+    fmt::print("{:<10}{:<15}{:>5}  {:<10}{:>10}{:>10}{:>10}{:>10}\n", "plate", "outline", "seed", "result",
+               "rms mm", "max mm", "outline", "corner");
   }
   const auto work = [&] {
     for (std::size_t i = next++; i < jobs.size(); i = next++) {
@@ -158,7 +171,11 @@ int run_campaign(const CampaignOptions& options) {
   if (options.json) {
     Json all = Json::array();
     for (const auto& r : rows) {
-      all.push_back({{"plate", r.job.plate}, {"outline", r.job.outline_name}, {"seed", r.job.seed}, {"result", r.result}, {"truth", r.truth}});
+      all.push_back({{"plate", r.job.plate},
+                     {"outline", r.job.outline_name},
+                     {"seed", r.job.seed},
+                     {"result", r.result},
+                     {"truth", r.truth}});
     }
     fmt::print("{}\n", all.dump(1));
   } else {

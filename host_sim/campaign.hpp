@@ -1,5 +1,5 @@
-// Many simulated runs: shapes x outlines x seeds, one row each, and a summary against the limits that the project
-// promises. Two runs at a time, each in a thread of its own; a run's result does not depend on that.
+// Many simulated runs: shapes x outlines x seeds, one row each, and a summary against the limits that the
+// project promises. Two runs at a time, each in a thread of its own; a run's result does not depend on that.
 #pragma once
 
 #include <cstdint>
@@ -18,6 +18,7 @@ struct CampaignOptions {
   std::string out;  // keep the run folders here; empty: they are removed
 };
 
-int run_campaign(const CampaignOptions&);  // the program's exit code: 0 when every run completed within the limits
+int run_campaign(
+    const CampaignOptions&);  // the program's exit code: 0 when every run completed within the limits
 
 }  // namespace moldloft::host_sim

@@ -48,7 +48,8 @@ int cell_command(SimulatedRunOptions& options) {
     return 1;
   }
   if (run->exit_code != 0) {
-    fmt::print(stderr, "moldloft-sim cell: {}: {}\n", run->summary["result"].get<std::string>(), run->summary["message"].get<std::string>());
+    fmt::print(stderr, "moldloft-sim cell: {}: {}\n", run->summary["result"].get<std::string>(),
+               run->summary["message"].get<std::string>());
     return run->exit_code;
   }
   fmt::print("{}", moldloft::firmware_like::result_table(run->summary, options.out.string()));
@@ -59,8 +60,10 @@ void add_cell_command(CLI::App& app, SimulatedRunOptions& options) {
   auto* command = app.add_subcommand("cell", "the whole cell in one thread: controller, cables and devices");
   add_cell_options(*command, options.cell);
   command->add_option("--out", options.out, "the run's folder; default: a new one under out/");
-  command->add_option_function<std::string>("--clock", [&](const std::string& c) { options.real_time = c == "real"; },
-                                            "virtual: as fast as it goes; real: paced by the wall clock")
+  command
+      ->add_option_function<std::string>(
+          "--clock", [&](const std::string& c) { options.real_time = c == "real"; },
+          "virtual: as fast as it goes; real: paced by the wall clock")
       ->check(CLI::IsMember({"virtual", "real"}));
 }
 
@@ -88,7 +91,8 @@ int main(int argc, char** argv) {
   devices_command->add_option("--robot-pty", devices.robot_pty, "name for the robot's terminal")
       ->capture_default_str();
 
-  devices_command->add_option("--cell", devices.cell_toml, "write a configuration that fits these devices to this file");
+  devices_command->add_option("--cell", devices.cell_toml,
+                              "write a configuration that fits these devices to this file");
 
   SimulatedRunOptions run;
   add_cell_command(app, run);

@@ -36,13 +36,17 @@ class WorldClock final : public hal::VirtualClock {
 };
 
 Json truth_json(const Verdict& v) {
-  return {{"normal_max_mm", v.normal_max_mm}, {"normal_rms_mm", v.normal_rms_mm}, {"outline_max_mm", v.outline_max_mm},
-          {"corner_max_mm", v.corner_max_mm}, {"points", v.points}};
+  return {{"normal_max_mm", v.normal_max_mm},
+          {"normal_rms_mm", v.normal_rms_mm},
+          {"outline_max_mm", v.outline_max_mm},
+          {"corner_max_mm", v.corner_max_mm},
+          {"points", v.points}};
 }
 
 // The judge's grid lies on the true plate, the picture's cells on the measured surface: each cell shows the grid point
 // nearest to its middle.
-firmware_like::PlateField error_field(const Verdict& verdict, const geometry::BSplineSurface& surface, int count) {
+firmware_like::PlateField error_field(const Verdict& verdict, const geometry::BSplineSurface& surface,
+                                      int count) {
   firmware_like::PlateField field;
   field.count_u = field.count_v = count;
   field.title = "Measured minus true surface, along the normal";
@@ -64,18 +68,21 @@ firmware_like::PlateField error_field(const Verdict& verdict, const geometry::BS
   return field;
 }
 
-void run_to_rest(Controller& controller, const SimulatedCell& cell, hal::Clock& clock, const SimulatedRunOptions& options) {
+void run_to_rest(Controller& controller, const SimulatedCell& cell, hal::Clock& clock,
+                 const SimulatedRunOptions& options) {
   controller.start();
   for (int ticks = 1; controller.tick() && clock.now() < options.time_limit; ++ticks) {
     if (options.on_tick) options.on_tick(cell, clock.now());
     if (ticks % ticks_between_drains == 0) controller.recorder().drain(cell.store);
-    if (options.on_progress && ticks % ticks_between_reports == 0) options.on_progress(controller.cell().progress());
+    if (options.on_progress && ticks % ticks_between_reports == 0)
+      options.on_progress(controller.cell().progress());
   }
   controller.recorder().drain(cell.store);
   if (options.on_progress) options.on_progress(controller.cell().progress());
 }
 
-std::expected<firmware_like::RunFolder, firmware_like::RunError> folder_for(const SimulatedRunOptions& options, const std::string& text) {
+std::expected<firmware_like::RunFolder, firmware_like::RunError> folder_for(
+    const SimulatedRunOptions& options, const std::string& text) {
   return options.resume ? firmware_like::resume_run(options.out, text)
                         : firmware_like::create_run(options.out, text, firmware_like::RunKind::simulated);
 }
@@ -98,19 +105,23 @@ std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& option
   if (options.real_time) clock.pace_by_wall();
   const auto controller = std::make_unique<Controller>(
       *config, clock, scanner_cable.host(), robot_cable.host(),
-      firmware_like::ControllerOptions{.archive = folder->archive.get(), .epoch = options.resume ? folder->archive->last_epoch() + 1 : 1});
+      firmware_like::ControllerOptions{.archive = folder->archive.get(),
+                                       .epoch = options.resume ? folder->archive->last_epoch() + 1 : 1});
   run_to_rest(*controller, {world, scanner_cable, robot_cable, *controller, *folder->store}, clock, options);
 
   const firmware_like::RunLabel label{.plate = plate->plate->name(), .seed = options.cell.seed};
-  SimulatedRun run{.summary = summary_of(*controller, label), .exit_code = firmware_like::exit_code(*controller)};
-  if (controller->recorder().store_failed()) return std::unexpected{SimError{std::string{controller->recorder().store_error().view()}}};
+  SimulatedRun run{.summary = summary_of(*controller, label),
+                   .exit_code = firmware_like::exit_code(*controller)};
+  if (controller->recorder().store_failed())
+    return std::unexpected{SimError{std::string{controller->recorder().store_error().view()}}};
   if (!options.resume && !controller->cell().has_driven()) {
     firmware_like::discard_run(std::move(*folder));
     return run;
   }
   std::optional<firmware_like::PlateField> errors;
   if (controller->cell().state() == tasks::CellState::complete) {
-    const auto verdict = judge(*plate, controller->surface().fit().surface(), controller->surface().outline().corners);
+    const auto verdict =
+        judge(*plate, controller->surface().fit().surface(), controller->surface().outline().corners);
     if (!verdict) return std::unexpected{verdict.error()};
     run.summary["truth"] = truth_json(*verdict);
     if (options.write_everything) errors = error_field(*verdict, controller->surface().fit().surface(), 56);

@@ -1,5 +1,6 @@
-// One run of the whole cell in one thread under virtual time: the controller that is deployed, on simulated cables,
-// against the simulated world. A pure function of the description: the same seed gives the same bytes.
+// One run of the whole cell in one thread under virtual time: the controller that is deployed, on simulated
+// cables, against the simulated world. A pure function of the description: the same seed gives the same
+// bytes.
 //
 // Blocking     writes the run folder; otherwise only computes
 // Failure      one line; a run that does not complete is no failure of the simulation: its summary says what happened
@@ -17,8 +18,8 @@
 
 namespace moldloft::host_sim {
 
-// What a scripted run may lay its hands on between two ticks: the devices behind their cables, the cables themselves, and
-// the controller, to look at or to command.
+// What a scripted run may lay its hands on between two ticks: the devices behind their cables, the cables
+// themselves, and the controller, to look at or to command.
 struct SimulatedCell {
   SimulatedWorld& world;
   hal::Cable& scanner_cable;
@@ -30,13 +31,15 @@ struct SimulatedCell {
 struct SimulatedRunOptions {
   CellDescription cell;
   std::filesystem::path out;
-  std::string config;            // the controller's cell.toml; empty: the one that fits the cell
-  bool resume = false;           // goes on with the run in `out`
-  bool write_everything = true;  // false: run.db and no other file; for campaigns that look at the summary only
-  bool real_time = false;        // paced by the wall clock instead of as fast as it goes
-  std::function<void(const tasks::CellProgress&)> on_progress;         // now and then, for a terminal
-  std::function<void(const SimulatedCell&, hal::Instant)> on_tick;     // after every tick: faults come from here
-  hal::Duration time_limit = std::chrono::hours{2};  // of cell time: a run that never rests is a defect, and ends here
+  std::string config;   // the controller's cell.toml; empty: the one that fits the cell
+  bool resume = false;  // goes on with the run in `out`
+  bool write_everything =
+      true;                // false: run.db and no other file; for campaigns that look at the summary only
+  bool real_time = false;  // paced by the wall clock instead of as fast as it goes
+  std::function<void(const tasks::CellProgress&)> on_progress;      // now and then, for a terminal
+  std::function<void(const SimulatedCell&, hal::Instant)> on_tick;  // after every tick: faults come from here
+  hal::Duration time_limit =
+      std::chrono::hours{2};  // of cell time: a run that never rests is a defect, and ends here
 };
 
 struct SimulatedRun {

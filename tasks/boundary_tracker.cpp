@@ -7,9 +7,9 @@
 namespace moldloft::tasks {
 namespace {
 
-using geometry::wrapped_angle;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+using geometry::wrapped_angle;
 
 constexpr double pi = std::numbers::pi;
 
@@ -133,7 +133,8 @@ bool BoundaryTracker::passes_anchor(const Seen& seen, const Piece& piece) const 
 
 void BoundaryTracker::remember_edges(const Seen& seen) {
   for (const auto& point : seen.view.points) {
-    if (edges_.size() == edges_.capacity()) return;  // sized for max_shots: only a plate beyond the plan gets here
+    if (edges_.size() == edges_.capacity())
+      return;  // sized for max_shots: only a plate beyond the plan gets here
     edges_.push_back((seen.world_from_scanner * point.position).head<2>());
   }
 }
@@ -199,8 +200,9 @@ ShotPlace BoundaryTracker::carry_out(TrackAction action, const Piece& piece) {
       }
       // What hides runs along the stripes: cross it and the side that was seen equally well. Should that show nothing
       // either, the guess was wrong, and a third of a turn looks from elsewhere.
-      next.head_yaw = nearest_half_turn(counts_.turns == 1 ? yaw_crossing_both(angle_of(heading_), stripe) : place_.head_yaw + pi / 3,
-                                        place_.head_yaw);
+      next.head_yaw = nearest_half_turn(
+          counts_.turns == 1 ? yaw_crossing_both(angle_of(heading_), stripe) : place_.head_yaw + pi / 3,
+          place_.head_yaw);
       break;
     }
     case TrackAction::back_up:
@@ -208,7 +210,8 @@ ShotPlace BoundaryTracker::carry_out(TrackAction action, const Piece& piece) {
       next.centre = front_;
       next.centre.head<2>() -= 10.0 * counts_.backs * heading_;
       break;
-    default: return next;
+    default:
+      return next;
   }
   hint_ = front_;
   hint_.head<2>() += hint_inside_mm * left_of(heading_);
@@ -250,16 +253,22 @@ hal::Message BoundaryTracker::explain(TrackAction action) const {
   const double x = place_.centre.x(), y = place_.centre.y();
   switch (action) {
     case TrackAction::report_off_plate:
-      return hal::Message::format("no plate under the scanner at x {:.0f} y {:.0f} mm: move [start] onto the plate", x, y);
+      return hal::Message::format(
+          "no plate under the scanner at x {:.0f} y {:.0f} mm: move [start] onto the plate", x, y);
     case TrackAction::report_no_edge:
-      return hal::Message::format("no edge from the start pose to x {:.0f} mm: is [start] on the plate to measure?", x);
+      return hal::Message::format(
+          "no edge from the start pose to x {:.0f} mm: is [start] on the plate to measure?", x);
     case TrackAction::report_hidden:
-      return hal::Message::format("boundary hidden between stripes at x {:.0f} y {:.0f} mm in {} directions: look at the edge there", x, y,
-                                  counts_.turns + 1);
+      return hal::Message::format(
+          "boundary hidden between stripes at x {:.0f} y {:.0f} mm in {} directions: look at the edge there",
+          x, y, counts_.turns + 1);
     case TrackAction::report_too_large:
-      return hal::Message::format("outline not closed after {} shots: raise [plate] largest_mm", counts_.shots);
+      return hal::Message::format("outline not closed after {} shots: raise [plate] largest_mm",
+                                  counts_.shots);
     default:
-      return hal::Message::format("boundary lost at x {:.0f} y {:.0f} mm: clear that edge of the plate and run again", front_.x(), front_.y());
+      return hal::Message::format(
+          "boundary lost at x {:.0f} y {:.0f} mm: clear that edge of the plate and run again", front_.x(),
+          front_.y());
   }
 }
 

@@ -1,5 +1,5 @@
-// The boundary tracker: from the edges that one shot shows to the next place to shoot from, once round the plate,
-// counter-clockwise (thesis section 5.3.2).
+// The boundary tracker: from the edges that one shot shows to the next place to shoot from, once round the
+// plate, counter-clockwise (thesis section 5.3.2).
 //
 //   seek_edge    from a start pose inside the plate along world +x until an edge shows
 //   first_side   the field is centred on that edge: the outline begins here
@@ -39,15 +39,27 @@ constexpr int track_state_count = 7;
 enum class TrackEvent : std::uint8_t {
   no_plate,           // the hint hit nothing
   plate_fills_field,  // plate, but no edge
-  side, corner,       // the piece that is being followed, and how it ends: at the field's limit
-  hidden,             // ... or hidden between stripes
-  loop_closed,        // the piece passes where the outline began
+  side,
+  corner,       // the piece that is being followed, and how it ends: at the field's limit
+  hidden,       // ... or hidden between stripes
+  loop_closed,  // the piece passes where the outline began
 };
 constexpr int track_event_count = 6;
 
 enum class TrackAction : std::uint8_t {
-  none, step_along_x, centre_on_edge, begin_outline, advance, turn, back_up, finish,
-  report_off_plate, report_no_edge, report_lost, report_hidden, report_too_large,
+  none,
+  step_along_x,
+  centre_on_edge,
+  begin_outline,
+  advance,
+  turn,
+  back_up,
+  finish,
+  report_off_plate,
+  report_no_edge,
+  report_lost,
+  report_hidden,
+  report_too_large,
 };
 
 struct TrackContext {
@@ -64,15 +76,16 @@ std::string_view to_string(TrackAction);
 
 struct TrackerSettings {
   double field_half_x_mm = 51, field_half_y_mm = 51;
-  double overlap_mm = 15;          // of the boundary piece that the next shot sees again
-  double crossing = 0.785;         // rad: stripes cross the boundary at 45 degrees, so that a square corner shows both sides
-  double min_crossing = 0.44;      // rad: below 25 degrees edge points become rare, the head is turned
+  double overlap_mm = 15;  // of the boundary piece that the next shot sees again
+  double crossing =
+      0.785;  // rad: stripes cross the boundary at 45 degrees, so that a square corner shows both sides
+  double min_crossing = 0.44;  // rad: below 25 degrees edge points become rare, the head is turned
   double seek_step_mm = 70;
-  double close_mm = 8;             // the loop is closed where a piece passes this near to its beginning
-  double corner_merge_mm = 20;     // corners nearer than this are one, seen twice
+  double close_mm = 8;          // the loop is closed where a piece passes this near to its beginning
+  double corner_merge_mm = 20;  // corners nearer than this are one, seen twice
   int max_seek_steps = 60, max_turns = 3, max_backs = 2, max_shots = 96;
   std::size_t max_edge_points = 24000;
-  std::size_t max_corners = 64;    // false ones included, which geometry/corner_choice.hpp sorts out
+  std::size_t max_corners = 64;  // false ones included, which geometry/corner_choice.hpp sorts out
 };
 
 class BoundaryTracker {
@@ -127,11 +140,11 @@ class BoundaryTracker {
   TrackerSettings settings_;
   TrackState state_ = TrackState::seek_edge;
   TrackContext counts_;
-  ShotPlace place_;             // of the shot that take() is about to look at
+  ShotPlace place_;  // of the shot that take() is about to look at
   Eigen::Vector3d front_{0, 0, 0}, hint_{0, 0, 0};
   Eigen::Vector2d heading_{1, 0}, anchor_{0, 0};
   double plate_z_mm_ = 0;
-  double turned_ = 0;           // rad, of the heading since the outline began
+  double turned_ = 0;  // rad, of the heading since the outline began
   std::vector<Eigen::Vector2d> edges_, corners_;
 };
 

@@ -9,8 +9,8 @@
 
 namespace moldloft::tasks {
 
-Cell::Cell(const CellSettings& settings, Clock& clock, hal::Scanner& scanner, hal::Robot& robot, hal::Recorder& recorder,
-           SurfaceTask& surface, const ShotArchive* archive)
+Cell::Cell(const CellSettings& settings, Clock& clock, hal::Scanner& scanner, hal::Robot& robot,
+           hal::Recorder& recorder, SurfaceTask& surface, const ShotArchive* archive)
     : settings_{settings},
       clock_{clock},
       scanner_{scanner},
@@ -73,8 +73,12 @@ void Cell::enter(CellAction action) {
       start_step_ = StartStep::devices;
       if (settings_.devices) start_devices();
       break;
-    case CellAction::measure: measure(); break;
-    case CellAction::flush_records: counting_ = false; break;
+    case CellAction::measure:
+      measure();
+      break;
+    case CellAction::flush_records:
+      counting_ = false;
+      break;
     case CellAction::stop_motion:
     case CellAction::drop_everything:
       counting_ = false;
@@ -94,7 +98,8 @@ void Cell::enter(CellAction action) {
       break;
     case CellAction::let_motion_end:
     case CellAction::take_up_again:
-    case CellAction::none: break;
+    case CellAction::none:
+      break;
   }
 }
 
@@ -127,7 +132,8 @@ void Cell::on_robot(const hal::RobotEvent& event) {
       calibrated_ = event.calibrated;
       record("robot", "ready", "", "", event.text);
       break;
-    case Kind::moving: break;
+    case Kind::moving:
+      break;
     case Kind::done:
       standing_ = event.pose;
       if (state_ == CellState::starting && start_step_ == StartStep::calibrating) {
@@ -147,14 +153,15 @@ void Cell::on_robot(const hal::RobotEvent& event) {
         arm_.turned_half = true;
         arm_.place.head_yaw = geometry::wrapped_angle(arm_.place.head_yaw + std::numbers::pi);
         arm_.commanded = tip_pose_for(arm_.place, settings_.tip_from_scanner);
-        if (const auto no = refuse_target(arm_.commanded, standing_, settings_.speed_percent, settings_.workspace)) {
+        if (const auto no =
+                refuse_target(arm_.commanded, standing_, settings_.speed_percent, settings_.workspace)) {
           abort(*no, HoldCause::measurement);
         } else if (!robot_.move(arm_.commanded, settings_.speed_percent, now_)) {
           abort("robot refused a target and takes no other: check it and clear");
         }
       } else {
-        abort(hal::Message::format("{} (shot {} at x {:.0f} y {:.0f} mm)", event.text.view(), arm_.number, arm_.place.centre.x(),
-                                   arm_.place.centre.y()),
+        abort(hal::Message::format("{} (shot {} at x {:.0f} y {:.0f} mm)", event.text.view(), arm_.number,
+                                   arm_.place.centre.x(), arm_.place.centre.y()),
               HoldCause::measurement);
       }
       break;
@@ -175,7 +182,9 @@ void Cell::on_scanner(const hal::ScannerEvent& event) {
     case Kind::exposed:
       if (shot_state_ == ShotState::exposing && event.shot_id == arm_.shot_id) apply(ShotEvent::exposed);
       break;
-    case Kind::frame: apply(ShotEvent::frame); break;
+    case Kind::frame:
+      apply(ShotEvent::frame);
+      break;
     case Kind::shot_failed:
       record("scanner", "shot failed", "", "", event.text);
       give_up(event.text);
@@ -208,20 +217,23 @@ void Cell::advance_state() {
       // The arm may calibrate as long as it likes; whoever else is not there makes the time run.
       if (devices_ready() || (scanner_ready() && robot_.state() == hal::RobotState::moving)) entered_ = now_;
       if (now_ - entered_ > settings_.device_timeout) {
-        abort(scanner_ready() ? hal::Message::format("robot: {}", robot_.why()) : hal::Message::format("scanner: {}", scanner_.why()));
+        abort(scanner_ready() ? hal::Message::format("robot: {}", robot_.why())
+                              : hal::Message::format("scanner: {}", scanner_.why()));
       }
       return;
     case CellState::execute:
       advance_phase();
       return sequence();
-    case CellState::completing: return apply(CellEvent::done);
+    case CellState::completing:
+      return apply(CellEvent::done);
     case CellState::holding:
       if (robot_rests()) apply(CellEvent::done);
       return;
     case CellState::held:
       // Looked at, not waited for: the scanner may have come back while the arm still ended its motion.
       if (cause_ == HoldCause::scanner && scanner_ready()) apply(CellEvent::unhold);
-      if (cause_ == HoldCause::recorder && recorder_.room_for_frame() && !recorder_.store_failed()) apply(CellEvent::unhold);
+      if (cause_ == HoldCause::recorder && recorder_.room_for_frame() && !recorder_.store_failed())
+        apply(CellEvent::unhold);
       return;
     case CellState::unholding:
       if (!settings_.devices || devices_ready()) apply(CellEvent::done);
@@ -229,16 +241,19 @@ void Cell::advance_state() {
     case CellState::stopping:
     case CellState::aborting:
       // A robot that no longer answers cannot say that it rests; its own watchdog stops it after three seconds.
-      if (robot_rests() || robot_.state() == hal::RobotState::offline || now_ - entered_ > 5s) apply(CellEvent::done);
+      if (robot_rests() || robot_.state() == hal::RobotState::offline || now_ - entered_ > 5s)
+        apply(CellEvent::done);
       return;
     case CellState::clearing:
       if (!settings_.devices || robot_.state() == hal::RobotState::ready) apply(CellEvent::done);
       return;
-    case CellState::resetting: return apply(CellEvent::done);
+    case CellState::resetting:
+      return apply(CellEvent::done);
     case CellState::idle:
     case CellState::complete:
     case CellState::stopped:
-    case CellState::aborted: return;
+    case CellState::aborted:
+      return;
   }
 }
 
@@ -254,9 +269,11 @@ std::optional<hal::Message> Cell::refuse_scanner() const {
   constexpr double tolerance = 0.01;
   const auto& info = scanner_.info();
   const double x = 2 * settings_.tracker.field_half_x_mm, y = 2 * settings_.tracker.field_half_y_mm;
-  if (std::abs(info.field_x_mm - x) <= tolerance * x && std::abs(info.field_y_mm - y) <= tolerance * y) return std::nullopt;
-  return hal::Message::format("scanner reports a field of {:.1f} x {:.1f} mm: correct [scanner] field_mm = [{:.1f}, {:.1f}]",
-                              info.field_x_mm, info.field_y_mm, x, y);
+  if (std::abs(info.field_x_mm - x) <= tolerance * x && std::abs(info.field_y_mm - y) <= tolerance * y)
+    return std::nullopt;
+  return hal::Message::format(
+      "scanner reports a field of {:.1f} x {:.1f} mm: correct [scanner] field_mm = [{:.1f}, {:.1f}]",
+      info.field_x_mm, info.field_y_mm, x, y);
 }
 
 bool Cell::scanner_ready() const {

@@ -1,4 +1,5 @@
-// The cell: supervisor (PackML), what happens inside Execute, and one shot after another. One row of the task table.
+// The cell: supervisor (PackML), what happens inside Execute, and one shot after another. One row of the task
+// table.
 //
 // At most one event of each source is worked on in a tick; every transition is recorded. The machines themselves are
 // tables (cell_state.hpp, shot_sequence.hpp, boundary_tracker.hpp); this class carries their actions out.
@@ -40,12 +41,12 @@ struct CellSettings {
   ShotViewSettings view;
   std::size_t max_stripes = 128, max_points = 65536;  // of a frame
   std::size_t max_surface_shots = 64;
-  double depth_mm = 60;              // the scanner's, to each side: how far off in height the start may be
-  double lowest_plate_z_mm = -1e9;   // what lies lower is the table
-  int max_attempts = 3;              // of one shot, before the cell holds
-  Duration device_timeout = 10s;     // for scanner and robot to become ready at the start
-  std::uint32_t epoch = 1;           // of this run's shot ids (shot_archive.hpp)
-  bool devices = true;               // false: only archived shots, nothing moves
+  double depth_mm = 60;             // the scanner's, to each side: how far off in height the start may be
+  double lowest_plate_z_mm = -1e9;  // what lies lower is the table
+  int max_attempts = 3;             // of one shot, before the cell holds
+  Duration device_timeout = 10s;    // for scanner and robot to become ready at the start
+  std::uint32_t epoch = 1;          // of this run's shot ids (shot_archive.hpp)
+  bool devices = true;              // false: only archived shots, nothing moves
 };
 
 enum class HoldCause : std::uint8_t {
@@ -79,7 +80,8 @@ class Cell final : public Task {
   void run(Instant now) override;
 
   void command(CellEvent);  // an operator's or line controller's command, taken up in the next tick
-  void abort(const hal::Message& why, HoldCause = HoldCause::person);  // on the control thread: what is dangerous
+  void abort(const hal::Message& why,
+             HoldCause = HoldCause::person);  // on the control thread: what is dangerous
   CellProgress progress() const { return published_.get(); }
   CellState state() const { return state_; }
   Phase phase() const { return phase_; }
@@ -96,7 +98,9 @@ class Cell final : public Task {
   std::uint64_t points_seen() const { return points_seen_; }
   const CycleTimes& cycle() const { return cycle_; }
   Duration surface_after_last_frame() const { return surface_ready_ - last_frame_; }
-  const Histogram& frame_to_command() const { return frame_to_command_; }  // last byte of a frame in, command given out
+  const Histogram& frame_to_command() const {
+    return frame_to_command_;
+  }  // last byte of a frame in, command given out
   std::size_t view_bytes() const { return view_.bytes(); }
   std::size_t plan_bytes() const;
 
@@ -150,7 +154,8 @@ class Cell final : public Task {
   void look_at(const Order&, const hal::Frame&);
   void use_shot();
   std::optional<double> learn_heights(const geometry::RigidMotion& world_from_scanner);
-  void use_boundary_shot(const Order&, const geometry::RigidMotion& world_from_scanner, std::optional<double> plate_z_mm);
+  void use_boundary_shot(const Order&, const geometry::RigidMotion& world_from_scanner,
+                         std::optional<double> plate_z_mm);
   void plan_surface();
   void next_surface_shot();
 

@@ -56,7 +56,8 @@ void Cell::advance_phase() {
       if (surface_.outline_ready()) plan_surface();
       return;
     case Phase::scan_surface:
-      if (surface_next_ == surface_planned_ && !wanted_ && !looking_ && shot_state_ == ShotState::parked && surface_.stage() == Stage::open) {
+      if (surface_next_ == surface_planned_ && !wanted_ && !looking_ && shot_state_ == ShotState::parked &&
+          surface_.stage() == Stage::open) {
         surface_.solve();
         set_phase(Phase::finish_fit);
       }
@@ -66,7 +67,8 @@ void Cell::advance_phase() {
       surface_ready_ = now_;
       set_phase(Phase::none);
       return apply(CellEvent::done);
-    default: return;
+    default:
+      return;
   }
 }
 
@@ -139,22 +141,29 @@ void Cell::use_boundary_shot(const Order& order, const geometry::RigidMotion& wo
   record("tracker", to_string(step.event), to_string(step.from), to_string(step.to),
          hal::Message::format("shot {}: {}", order.number, to_string(step.action)));
   switch (step.to) {
-    case TrackState::failed: return hold(HoldCause::measurement, step.text);
+    case TrackState::failed:
+      return hold(HoldCause::measurement, step.text);
     case TrackState::closed:
       set_phase(Phase::plan_scan);
       heights_.solve();
       return surface_.build_outline(tracker_.edge_points(), tracker_.corners());
-    case TrackState::seek_edge: break;
-    default: set_phase(Phase::track_boundary); break;
+    case TrackState::seek_edge:
+      break;
+    default:
+      set_phase(Phase::track_boundary);
+      break;
   }
-  if (step.next) want(*step.next, step.to == TrackState::seek_edge ? ShotPurpose::seek : ShotPurpose::boundary);
+  if (step.next)
+    want(*step.next, step.to == TrackState::seek_edge ? ShotPurpose::seek : ShotPurpose::boundary);
 }
 
 void Cell::plan_surface() {
   const auto& last = boundary_places_.back();
-  const auto planned = plan_zigzag(surface_.outline(), heights_, settings_.scan, last.centre.head<2>(), last.head_yaw, surface_places_);
+  const auto planned = plan_zigzag(surface_.outline(), heights_, settings_.scan, last.centre.head<2>(),
+                                   last.head_yaw, surface_places_);
   if (!planned) {
-    return hold(HoldCause::measurement, "the plate needs more shots than [plate] largest_mm plans for: raise it and run again");
+    return hold(HoldCause::measurement,
+                "the plate needs more shots than [plate] largest_mm plans for: raise it and run again");
   }
   surface_planned_ = *planned;
   surface_next_ = 0;

@@ -12,7 +12,8 @@ using hal::ShotPurpose;
 namespace {
 
 // Of the two yaws that look the same, the one at which the pose was commanded: what is planned next depends on it.
-ShotPlace place_commanded(const ShotPlace& wanted, const hal::Pose& commanded, const geometry::RigidMotion& tip_from_scanner) {
+ShotPlace place_commanded(const ShotPlace& wanted, const hal::Pose& commanded,
+                          const geometry::RigidMotion& tip_from_scanner) {
   ShotPlace best = wanted;
   double least = INFINITY;
   for (const double half_turn : {0.0, std::numbers::pi}) {
@@ -43,13 +44,16 @@ void Cell::sequence() {
     skip_given_up();
     if (deliver_archived()) return;
     if (!settings_.devices) {
-      return hold(HoldCause::measurement, hal::Message::format("the recording ends before shot {}: resume the run on the cell to go on",
-                                                               wanted_->number));
+      return hold(
+          HoldCause::measurement,
+          hal::Message::format("the recording ends before shot {}: resume the run on the cell to go on",
+                               wanted_->number));
     }
     if (robot_.state() == hal::RobotState::ready) apply(ShotEvent::order);
   }
   if (shot_state_ == ShotState::in_place && may_expose()) apply(ShotEvent::clear);
-  if (shot_state_ == ShotState::in_place && recorder_.store_failed()) hold(HoldCause::recorder, recorder_.store_error());
+  if (shot_state_ == ShotState::in_place && recorder_.store_failed())
+    hold(HoldCause::recorder, recorder_.store_error());
 }
 
 // The next frame would overwrite the last one: nobody may need that any more.
@@ -73,9 +77,13 @@ void Cell::apply(ShotEvent event) {
 
 void Cell::carry_out(ShotAction action) {
   switch (action) {
-    case ShotAction::drive: return drive();
-    case ShotAction::note_pose: arm_.reported = standing_; return;
-    case ShotAction::trigger: return trigger();
+    case ShotAction::drive:
+      return drive();
+    case ShotAction::note_pose:
+      arm_.reported = standing_;
+      return;
+    case ShotAction::trigger:
+      return trigger();
     case ShotAction::release_arm:
       exposed_ = arm_;
       if (phase_ == Phase::scan_surface) next_surface_shot();
@@ -84,9 +92,11 @@ void Cell::carry_out(ShotAction action) {
       exposed_ = arm_;
       if (phase_ == Phase::scan_surface) next_surface_shot();
       return deliver();
-    case ShotAction::deliver: return deliver();
+    case ShotAction::deliver:
+      return deliver();
     case ShotAction::give_up:
-    case ShotAction::none: return;
+    case ShotAction::none:
+      return;
   }
 }
 
@@ -118,7 +128,8 @@ bool Cell::pick_pose(Order& order) {
       order.turned_half = true;  // only one of the two is left
       continue;
     }
-    const double turn = std::abs(geometry::wrapped_angle((pose.roll - pose.yaw) - (standing_.roll - standing_.yaw)));
+    const double turn =
+        std::abs(geometry::wrapped_angle((pose.roll - pose.yaw) - (standing_.roll - standing_.yaw)));
     if (turn >= least_turn) continue;
     least_turn = turn;
     order.place = place;
@@ -175,11 +186,13 @@ void Cell::deliver() {
   look_at(exposed_, frame);
 }
 
-// A surface shot that the archive leaves out before later ones was given up when the run was recorded, and its place was
-// put at the end of the plan (give_up): so it is again, or every later number would stand for another place.
+// A surface shot that the archive leaves out before later ones was given up when the run was recorded, and
+// its place was put at the end of the plan (give_up): so it is again, or every later number would stand for
+// another place.
 void Cell::skip_given_up() {
-  while (archive_ != nullptr && wanted_ && wanted_->purpose == ShotPurpose::surface && wanted_->number < archive_->last() &&
-         archive_->find(wanted_->number) == nullptr && surface_planned_ < surface_places_.size()) {
+  while (archive_ != nullptr && wanted_ && wanted_->purpose == ShotPurpose::surface &&
+         wanted_->number < archive_->last() && archive_->find(wanted_->number) == nullptr &&
+         surface_planned_ < surface_places_.size()) {
     surface_places_[surface_planned_++] = wanted_->place;
     ++retaken_;
     wanted_.reset();

@@ -1,4 +1,5 @@
-// The cell's supervisor: the states of ISA-TR88 (PackML), since that is what line controllers speak, as one table.
+// The cell's supervisor: the states of ISA-TR88 (PackML), since that is what line controllers speak, as one
+// table.
 #pragma once
 
 #include <cstdint>
@@ -10,21 +11,47 @@
 namespace moldloft::tasks {
 
 enum class CellState : std::uint8_t {
-  idle, starting, execute, completing, complete, holding, held, unholding,
-  stopping, stopped, aborting, aborted, clearing, resetting,
+  idle,
+  starting,
+  execute,
+  completing,
+  complete,
+  holding,
+  held,
+  unholding,
+  stopping,
+  stopped,
+  aborting,
+  aborted,
+  clearing,
+  resetting,
 };
 constexpr int cell_state_count = 14;
 
 enum class CellEvent : std::uint8_t {
-  start, hold, unhold, stop, abort, clear, reset,  // commands, and hold/abort by the cell itself
-  done,                                            // what the present state does is finished (PackML: SC)
+  start,
+  hold,
+  unhold,
+  stop,
+  abort,
+  clear,
+  reset,  // commands, and hold/abort by the cell itself
+  done,   // what the present state does is finished (PackML: SC)
 };
 constexpr int cell_event_count = 8;
 
 // What the cell begins to do on entering the next state.
 enum class CellAction : std::uint8_t {
-  none, connect_and_calibrate, measure, flush_records, let_motion_end, take_up_again, stop_motion, drop_everything,
-  synchronise_again, forget_run,
+  none,
+  connect_and_calibrate,
+  measure,
+  flush_records,
+  let_motion_end,
+  take_up_again,
+  stop_motion,
+  drop_everything,
+  synchronise_again,
+  forget_run,
 };
 
 struct CellContext {};

@@ -1,5 +1,6 @@
-// A rough idea of the plate's height for placing the scanner: the quadric z = c . (1, x, y, x^2, xy, y^2) that fits
-// best what has been seen so far. Good to a few millimetres, which is what the scanner's depth of field asks for.
+// A rough idea of the plate's height for placing the scanner: the quadric z = c . (1, x, y, x^2, xy, y^2)
+// that fits best what has been seen so far. Good to a few millimetres, which is what the scanner's depth of
+// field asks for.
 //
 // Frame world, mm, coordinates taken relative to the first point. No allocation; add() 40 ns, at() solves 6 x 6.
 #pragma once

@@ -10,7 +10,8 @@ std::size_t Histogram::bucket_of(std::uint64_t ns) noexcept {
   // Below 32 ns a bucket is one nanosecond; above, the five bits after the leading one say which part of its octave.
   if (ns < (1u << sub_bits)) return static_cast<std::size_t>(ns);
   const int octave = std::bit_width(ns) - 1 - sub_bits;
-  return (static_cast<std::size_t>(octave + 1) << sub_bits) + static_cast<std::size_t>((ns >> octave) - (1u << sub_bits));
+  return (static_cast<std::size_t>(octave + 1) << sub_bits) +
+         static_cast<std::size_t>((ns >> octave) - (1u << sub_bits));
 }
 
 std::uint64_t Histogram::limit_of(std::size_t bucket) noexcept {

@@ -7,24 +7,27 @@ namespace {
 
 std::optional<hal::Message> outside(const char* what, double value, const Range& range) {
   if (range.contains(value)) return std::nullopt;
-  return hal::Message::format("target outside the workspace: {} {:.1f} mm, limit {:.1f} to {:.1f} mm: move the plate, or widen "
-                              "[robot.workspace] if the arm may go there",
-                              what, value, range.min, range.max);
+  return hal::Message::format(
+      "target outside the workspace: {} {:.1f} mm, limit {:.1f} to {:.1f} mm: move the plate, or widen "
+      "[robot.workspace] if the arm may go there",
+      what, value, range.min, range.max);
 }
 
 }  // namespace
 
-std::optional<hal::Message> refuse_target(const hal::Pose& target, const hal::Pose& standing, int speed_percent,
-                                          const Workspace& workspace) {
+std::optional<hal::Message> refuse_target(const hal::Pose& target, const hal::Pose& standing,
+                                          int speed_percent, const Workspace& workspace) {
   if (!is_finite(target)) return hal::Message{"target is not finite: the pose was computed from bad data"};
   if (auto no = outside("x", target.x_mm, workspace.x_mm)) return no;
   if (auto no = outside("y", target.y_mm, workspace.y_mm)) return no;
   if (auto no = outside("z", target.z_mm, workspace.z_mm)) return no;
   if (auto no = outside("reach", std::hypot(target.x_mm, target.y_mm), workspace.reach_mm)) return no;
-  const double step = std::hypot(target.x_mm - standing.x_mm, target.y_mm - standing.y_mm, target.z_mm - standing.z_mm);
+  const double step =
+      std::hypot(target.x_mm - standing.x_mm, target.y_mm - standing.y_mm, target.z_mm - standing.z_mm);
   if (auto no = outside("step", step, Range{0, workspace.max_step_mm})) return no;
   if (speed_percent < 1 || speed_percent > workspace.max_speed_percent) {
-    return hal::Message::format("speed {} % outside the limit 1 to {} %", speed_percent, workspace.max_speed_percent);
+    return hal::Message::format("speed {} % outside the limit 1 to {} %", speed_percent,
+                                workspace.max_speed_percent);
   }
   return std::nullopt;
 }

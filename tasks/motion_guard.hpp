@@ -1,5 +1,5 @@
-// The last check before a target goes to the robot: finite, inside the workspace, not too long a step, not too fast.
-// What fails is never sent; the message names the limit.
+// The last check before a target goes to the robot: finite, inside the workspace, not too long a step, not
+// too fast. What fails is never sent; the message names the limit.
 //
 // Units mm and rad, world frame. Pure, no allocation.
 #pragma once
@@ -19,13 +19,13 @@ struct Range {
 
 struct Workspace {
   Range x_mm{-2000, 2000}, y_mm{-2000, 2000}, z_mm{-500, 1000};  // of the robot's tip
-  Range reach_mm{0, 1e9};      // distance of the tip from the robot's axis: a SCARA reaches a ring
-  double max_step_mm = 2000;   // from where it stands
+  Range reach_mm{0, 1e9};     // distance of the tip from the robot's axis: a SCARA reaches a ring
+  double max_step_mm = 2000;  // from where it stands
   int max_speed_percent = 100;
 };
 
 // Nothing when the target may be sent; else one line: which limit, by how much.
-std::optional<hal::Message> refuse_target(const hal::Pose& target, const hal::Pose& standing, int speed_percent,
-                                          const Workspace& workspace);
+std::optional<hal::Message> refuse_target(const hal::Pose& target, const hal::Pose& standing,
+                                          int speed_percent, const Workspace& workspace);
 
 }  // namespace moldloft::tasks

@@ -15,8 +15,8 @@ constexpr int sample_count = 4 * samples_per_side;
 using Samples = std::array<Vector2d, sample_count>;
 
 struct Box {
-  double yaw = 0;            // of its first axis in world
-  Vector2d min, max;         // in its own axes
+  double yaw = 0;     // of its first axis in world
+  Vector2d min, max;  // in its own axes
   double area() const { return (max - min).prod(); }
 };
 
@@ -47,7 +47,8 @@ Box box_at(double yaw, const Samples& points) {
   return box;
 }
 
-// The least box has a side along a side of the convex hull; for a plate of four smooth sides the chords are near enough.
+// The least box has a side along a side of the convex hull; for a plate of four smooth sides the chords are
+// near enough.
 Box least_box(const geometry::Outline& outline, const Samples& points) {
   Box best;
   double least = INFINITY;
@@ -69,7 +70,8 @@ struct Spread {
 Spread spread(double from, double to, double field, const ScanPlanSettings& settings) {
   const double length = to - from + 2 * settings.margin_mm;
   Spread s;
-  if (length > field) s.count = 1 + static_cast<int>(std::ceil((length - field) / (field - settings.overlap_mm) - 1e-9));
+  if (length > field)
+    s.count = 1 + static_cast<int>(std::ceil((length - field) / (field - settings.overlap_mm) - 1e-9));
   s.step = s.count > 1 ? (length - field) / (s.count - 1) : 0;
   s.first = s.count > 1 ? from - settings.margin_mm + field / 2 : (from + to) / 2;
   return s;
@@ -95,9 +97,11 @@ std::pair<double, double> extent_in_row(const Box& box, const Samples& points, d
 
 }  // namespace
 
-std::expected<std::size_t, geometry::Error> plan_zigzag(const geometry::Outline& outline, const HeightModel& heights,
-                                                        const ScanPlanSettings& settings, const Vector2d& from,
-                                                        double head_yaw_now, std::span<ShotPlace> places) {
+std::expected<std::size_t, geometry::Error> plan_zigzag(const geometry::Outline& outline,
+                                                        const HeightModel& heights,
+                                                        const ScanPlanSettings& settings,
+                                                        const Vector2d& from, double head_yaw_now,
+                                                        std::span<ShotPlace> places) {
   const Samples points = sample(outline);
   const Box box = least_box(outline, points);
   const double half_turns = std::round((head_yaw_now - box.yaw) / std::numbers::pi);
@@ -111,14 +115,16 @@ std::expected<std::size_t, geometry::Error> plan_zigzag(const geometry::Outline&
   std::size_t count = 0;
   for (int row = 0; row < rows.count; ++row, forwards = !forwards) {
     const double y = rows.first + (from_top ? rows.count - 1 - row : row) * rows.step;
-    const auto [low, high] = extent_in_row(box, points, y - settings.field_y_mm / 2, y + settings.field_y_mm / 2);
+    const auto [low, high] =
+        extent_in_row(box, points, y - settings.field_y_mm / 2, y + settings.field_y_mm / 2);
     if (low > high) continue;
     const Spread columns = spread(low, high, settings.field_x_mm, settings);
     for (int column = 0; column < columns.count; ++column) {
       if (count == places.size()) return std::unexpected{geometry::Error::capacity};
       const double x = columns.first + (forwards ? column : columns.count - 1 - column) * columns.step;
       const Vector2d centre = out_of(box.yaw, {x, y});
-      places[count++] = {.centre = {centre.x(), centre.y(), heights.at(centre.x(), centre.y())}, .head_yaw = yaw};
+      places[count++] = {.centre = {centre.x(), centre.y(), heights.at(centre.x(), centre.y())},
+                         .head_yaw = yaw};
     }
   }
   return count;

@@ -1,6 +1,6 @@
-// The zig-zag: which shots cover the plate. The outline's bounding box, turned to the plate so that its area is least,
-// is cut into rows; each row holds as many shots as the outline is long there; every other row runs backwards (thesis
-// section 5.3.3, without its assumption that the plate lies along the axes).
+// The zig-zag: which shots cover the plate. The outline's bounding box, turned to the plate so that its area
+// is least, is cut into rows; each row holds as many shots as the outline is long there; every other row runs
+// backwards (thesis section 5.3.3, without its assumption that the plate lies along the axes).
 //
 // Frame        world, plan view, mm; the centre's height comes from the height model
 // Allocation   none: shots go into the caller's array
@@ -25,8 +25,10 @@ struct ScanPlanSettings {
 
 // Fills `places` in the order of travel, beginning at the corner of the box nearest to `from`; returns how many.
 // `head_yaw_now` picks between yaws that differ by half a turn.
-std::expected<std::size_t, geometry::Error> plan_zigzag(const geometry::Outline& outline, const HeightModel& heights,
-                                                        const ScanPlanSettings& settings, const Eigen::Vector2d& from,
-                                                        double head_yaw_now, std::span<ShotPlace> places);
+std::expected<std::size_t, geometry::Error> plan_zigzag(const geometry::Outline& outline,
+                                                        const HeightModel& heights,
+                                                        const ScanPlanSettings& settings,
+                                                        const Eigen::Vector2d& from, double head_yaw_now,
+                                                        std::span<ShotPlace> places);
 
 }  // namespace moldloft::tasks

@@ -21,7 +21,8 @@ int Scheduler::add_background(const BackgroundSpec& spec, BackgroundTask& task) 
 }
 
 std::string_view Scheduler::name_of(int task) const {
-  if (task >= background_base) return background_records_[static_cast<std::size_t>(task - background_base)].spec.name;
+  if (task >= background_base)
+    return background_records_[static_cast<std::size_t>(task - background_base)].spec.name;
   if (task >= 0) return records_[static_cast<std::size_t>(task)].spec.name;
   return "none";
 }
@@ -128,7 +129,8 @@ bool Scheduler::count_missed(Instant t) {
     misses_in_a_row_ = 0;
     return true;
   }
-  const auto missed = static_cast<std::uint64_t>((t - next_tick_ - settings_.late_tolerance - 1ns) / settings_.tick) + 1;
+  const auto missed =
+      static_cast<std::uint64_t>((t - next_tick_ - settings_.late_tolerance - 1ns) / settings_.tick) + 1;
   missed_ += missed;
   ++misses_in_a_row_;
   // When no task ran for most of a tick, the tick itself was begun late: the machine woke us late.

@@ -1,12 +1,13 @@
-// The fixed-step cooperative scheduler: a static table of tasks, run in its order at every tick, and background tasks in
-// the slack that is left.
+// The fixed-step cooperative scheduler: a static table of tasks, run in its order at every tick, and
+// background tasks in the slack that is left.
 //
 // Deadlines    absolute: next = previous + tick, in 64-bit nanoseconds; a tick that another ran into by more
 //              than the tolerance is missed, counted with its cause, and treated by the policy that the settings name
 // Statistics   one clock read per task boundary; the first ticks after start() are left out (caches and pages warm up)
 // Background   a step runs only if the larger of its declared quantum and its decaying measured peak fits between now
 //              and the guard time before the next tick. A task that does not fit has its peak halved towards the
-//              declared quantum; after `starvation_ticks` without a run it gets one step all the same (counted as forced)
+//              declared quantum; after `starvation_ticks` without a run it gets one step all the same
+//              (counted as forced)
 // Thread       add*() before start(); run*() on the control thread; running_task() from anywhere
 // Blocking     only in Clock::sleep_until, between ticks
 // Allocation   none: the tables are arrays of fixed size
@@ -93,7 +94,8 @@ enum class MissedTickPolicy {
 
 struct SchedulerSettings {
   Duration tick = 1ms;
-  Duration guard = 100us;  // kept free before the next tick: a background step may overrun by this without harm
+  Duration guard =
+      100us;  // kept free before the next tick: a background step may overrun by this without harm
   Duration late_tolerance = 100us;  // a tick that can still begin within this is late, not missed
   MissedTickPolicy missed = MissedTickPolicy::skip_keep_phase;
   std::uint32_t warm_up_ticks = 10;
@@ -118,12 +120,16 @@ class Scheduler {
   std::uint64_t ticks() const noexcept { return ticks_; }
   std::uint64_t missed_ticks() const noexcept { return missed_; }
   std::uint32_t misses_in_a_row() const noexcept { return misses_in_a_row_; }
-  int last_miss_cause() const noexcept { return last_miss_cause_; }  // the task that ran longest then; no_task: woken late
+  int last_miss_cause() const noexcept {
+    return last_miss_cause_;
+  }  // the task that ran longest then; no_task: woken late
   int running_task() const noexcept { return running_.load(std::memory_order_relaxed); }
   std::string_view name_of(int task) const;
 
   std::span<const TaskRecord> tasks() const { return {records_.data(), task_count_}; }
-  std::span<const BackgroundRecord> background() const { return {background_records_.data(), background_count_}; }
+  std::span<const BackgroundRecord> background() const {
+    return {background_records_.data(), background_count_};
+  }
   const Histogram& wake_up() const { return wake_up_; }  // how late a tick began
   const Histogram& slack() const { return slack_; }      // left over when the table was done
   const SchedulerSettings& settings() const { return settings_; }

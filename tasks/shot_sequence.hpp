@@ -1,4 +1,5 @@
-// One shot after another: drive there, expose, let the scanner compute while the arm goes on to the next place.
+// One shot after another: drive there, expose, let the scanner compute while the arm goes on to the next
+// place.
 //
 // The machine knows two resources, the arm and the scanner. An order is a pose to shoot from; the next order may come
 // as soon as EXPOSED is seen (the arm is free then), the next exposure only when the frame before has arrived.
@@ -29,12 +30,19 @@ enum class ShotEvent : std::uint8_t {
   clear,    // scanner ready, recorder and fit have room: an exposure is allowed
   exposed,
   frame,
-  failed,   // the driver gave the shot up
+  failed,  // the driver gave the shot up
 };
 constexpr int shot_event_count = 6;
 
 enum class ShotAction : std::uint8_t {
-  none, drive, note_pose, trigger, release_arm, deliver, release_and_deliver, give_up,
+  none,
+  drive,
+  note_pose,
+  trigger,
+  release_arm,
+  deliver,
+  release_and_deliver,
+  give_up,
 };
 
 struct ShotContext {};

@@ -9,7 +9,8 @@ namespace moldloft::tasks {
 using geometry::PlateRun;
 
 namespace {
-constexpr std::size_t max_runs_per_stripe = 8;  // a plate with more holes than that on one line is not a plate
+constexpr std::size_t max_runs_per_stripe =
+    8;  // a plate with more holes than that on one line is not a plate
 }
 
 ShotView::ShotView(std::size_t max_stripes, std::size_t max_points, const ShotViewSettings& settings)
@@ -28,7 +29,9 @@ void ShotView::begin(const hal::Frame& frame, const Eigen::Vector3d& hint, doubl
   boundary_ = {};
   stripes_.clear();
   for (const auto& line : frame.lines()) {
-    const auto column = [&](const std::vector<float>& c) { return std::span{c}.subspan(line.first, line.count); };
+    const auto column = [&](const std::vector<float>& c) {
+      return std::span{c}.subspan(line.first, line.count);
+    };
     stripes_.push_back({column(frame.x), column(frame.y), column(frame.z)});
   }
   // A frame beyond the memory plan cannot come: the driver was told the same limits.
@@ -66,7 +69,8 @@ bool ShotView::within_margins(const PlateRun& run, std::uint32_t point) const {
 // the gate of a scanner whose noise is a thousandth of its field.
 bool ShotView::is_outlier(const PlateRun& run, std::uint32_t point) const {
   const auto& z = stripes_[run.stripe].z;
-  const std::uint32_t from = std::max(run.first, point < 2 ? 0 : point - 2), to = std::min(run.last, point + 2);
+  const std::uint32_t from = std::max(run.first, point < 2 ? 0 : point - 2),
+                      to = std::min(run.last, point + 2);
   const double gate = settings_.outlier_sigmas * settings_.runs.noise_mm;
   int near = 0, far = 0;
   for (std::uint32_t i = from; i <= to; ++i) {

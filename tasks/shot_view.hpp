@@ -1,4 +1,5 @@
-// From a frame to what the cell makes of it: the plate's runs, the boundary's pieces, the points that lie on the plate.
+// From a frame to what the cell makes of it: the plate's runs, the boundary's pieces, the points that lie on
+// the plate.
 //
 // Frame        scanner coordinates in, scanner coordinates out; the caller registers with the shot's pose
 // Cost         0.6 ms for 100 stripes of 500 points, in pieces of about 0.1 ms
@@ -17,8 +18,9 @@ namespace moldloft::tasks {
 struct ShotViewSettings {
   geometry::PlateRunSettings runs;
   geometry::BoundaryViewSettings boundary;
-  double edge_margin_mm = 1.5;  // points nearer than this to an edge, along the stripe, stay out of the surface
-  double outlier_sigmas = 6;    // a point this far from the median of its neighbours stays out as well
+  double edge_margin_mm =
+      1.5;                    // points nearer than this to an edge, along the stripe, stay out of the surface
+  double outlier_sigmas = 6;  // a point this far from the median of its neighbours stays out as well
 };
 
 class ShotView {
@@ -53,7 +55,7 @@ class ShotView {
   std::span<const geometry::PlateRun> runs_;
   geometry::BoundaryViewer::View boundary_;
   Eigen::Vector3d hint_{0, 0, 0};
-  std::size_t run_ = 0;         // where the walk stands
+  std::size_t run_ = 0;  // where the walk stands
   std::uint32_t point_ = 0, stride_ = 1;
 };
 

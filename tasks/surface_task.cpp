@@ -5,7 +5,10 @@
 namespace moldloft::tasks {
 
 SurfaceTask::SurfaceTask(const SurfaceTaskSettings& settings)
-    : settings_{settings}, corners_{settings.corners}, outline_{settings.max_edge_points, settings.outline}, fit_{settings.fit} {
+    : settings_{settings},
+      corners_{settings.corners},
+      outline_{settings.max_edge_points, settings.outline},
+      fit_{settings.fit} {
   reserve_.reserve(settings.max_boundary_shots * settings.reserve_points_per_shot);
   reserve_ends_.reserve(settings.max_boundary_shots);
 }
@@ -52,8 +55,8 @@ void SurfaceTask::solve() {
 }
 
 bool SurfaceTask::has_work() const {
-  return looking() || stage_ == Stage::choosing_corners || stage_ == Stage::building_outline || stage_ == Stage::folding_reserve || stage_ == Stage::folding ||
-         stage_ == Stage::solving;
+  return looking() || stage_ == Stage::choosing_corners || stage_ == Stage::building_outline ||
+         stage_ == Stage::folding_reserve || stage_ == Stage::folding || stage_ == Stage::solving;
 }
 
 void SurfaceTask::step(Instant) {
@@ -62,12 +65,18 @@ void SurfaceTask::step(Instant) {
     return;
   }
   switch (stage_) {
-    case Stage::choosing_corners: return step_corners();
-    case Stage::building_outline: return step_outline();
-    case Stage::folding_reserve: return step_reserve();
-    case Stage::folding: return step_fold();
-    case Stage::solving: return step_solve();
-    default: return;
+    case Stage::choosing_corners:
+      return step_corners();
+    case Stage::building_outline:
+      return step_outline();
+    case Stage::folding_reserve:
+      return step_reserve();
+    case Stage::folding:
+      return step_fold();
+    case Stage::solving:
+      return step_solve();
+    default:
+      return;
   }
 }
 
@@ -103,7 +112,8 @@ void SurfaceTask::step_reserve() {
   const std::size_t end = reserve_ends_[reserve_shot_];
   const std::size_t count = std::min(end - reserve_next_, chunk_points);
   if (count > 0) {
-    const auto added = fit_.add(std::span{reserve_}.subspan(reserve_next_, count), 1.0, static_cast<int>(reserve_shot_));
+    const auto added =
+        fit_.add(std::span{reserve_}.subspan(reserve_next_, count), 1.0, static_cast<int>(reserve_shot_));
     if (!added) return fail(added.error());
   }
   reserve_next_ += count;

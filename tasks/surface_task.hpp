@@ -1,8 +1,9 @@
-// The geometry that runs in the slack of the ticks: outline from the edge points, plan map, surface fit. The cell asks
-// for the next piece of work and looks now and then whether it is done.
+// The geometry that runs in the slack of the ticks: outline from the edge points, plan map, surface fit. The
+// cell asks for the next piece of work and looks now and then whether it is done.
 //
-// Boundary shots come before the outline is known, so their points cannot be folded into the fit yet: every n-th is kept
-// in a reserve of fixed size (their number hardly matters: what a shot's points have in common, the robot's error, does).
+// Boundary shots come before the outline is known, so their points cannot be folded into the fit yet: every
+// n-th is kept in a reserve of fixed size (their number hardly matters: what a shot's points have in common,
+// the robot's error, does).
 //
 // Thread       the control thread; step() is called by the scheduler in the slack
 // Work         step() does one bounded piece: a chunk of points, one pass over a side, one slice of the solution
@@ -59,7 +60,8 @@ class SurfaceTask final : public BackgroundTask {
   void look(ShotView& shot) { looking_at_ = &shot; }
   bool looking() const { return looking_at_ != nullptr; }
   // `corner_candidates`: what the tracker took for corners; more than four is no harm.
-  void build_outline(std::span<const Eigen::Vector2d> edges, std::span<const Eigen::Vector2d> corner_candidates);
+  void build_outline(std::span<const Eigen::Vector2d> edges,
+                     std::span<const Eigen::Vector2d> corner_candidates);
   // Folds a surface shot in; `shot` and its frame stay untouched by others until stage() is open again.
   void fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner);
   void solve();

@@ -17,7 +17,12 @@ RigidMotion motion_of(const hal::Pose& p) {
 hal::Pose pose_of(const RigidMotion& motion) {
   const auto angles = geometry::zyz_from_rotation(motion.linear());
   const Eigen::Vector3d t = motion.translation();
-  return {.x_mm = t.x(), .y_mm = t.y(), .z_mm = t.z(), .yaw = angles.yaw, .pitch = angles.pitch, .roll = angles.roll};
+  return {.x_mm = t.x(),
+          .y_mm = t.y(),
+          .z_mm = t.z(),
+          .yaw = angles.yaw,
+          .pitch = angles.pitch,
+          .roll = angles.roll};
 }
 
 hal::Pose tip_pose_for(const ShotPlace& place, const RigidMotion& tip_from_scanner) {
@@ -27,7 +32,8 @@ hal::Pose tip_pose_for(const ShotPlace& place, const RigidMotion& tip_from_scann
   const double yaw_at_zero = std::atan2(axis.y(), axis.x());
   const double roll = geometry::wrapped_angle(yaw_at_zero - place.head_yaw);
   const Eigen::Vector3d tip = place.centre - down(roll) * tip_from_scanner.translation();
-  return {.x_mm = tip.x(), .y_mm = tip.y(), .z_mm = tip.z(), .yaw = 0, .pitch = std::numbers::pi, .roll = roll};
+  return {
+      .x_mm = tip.x(), .y_mm = tip.y(), .z_mm = tip.z(), .yaw = 0, .pitch = std::numbers::pi, .roll = roll};
 }
 
 }  // namespace moldloft::tasks

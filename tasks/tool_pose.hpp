@@ -1,5 +1,5 @@
-// Between poses on the wire and rigid motions, and from where the scanner shall look to where the tip must go.
-// Frames: world, tip, scanner. mm and rad. Pure.
+// Between poses on the wire and rigid motions, and from where the scanner shall look to where the tip must
+// go. Frames: world, tip, scanner. mm and rad. Pure.
 #pragma once
 
 #include "geometry/rigid_motion.hpp"

@@ -1,8 +1,10 @@
-// State machines as tables: one row a transition, read by people, by the machine, by the test that proves that every
-// pair of state and event is either listed or explicitly ignored, and by the program that draws the diagrams.
+// State machines as tables: one row a transition, read by people, by the machine, by the test that proves
+// that every pair of state and event is either listed or explicitly ignored, and by the program that draws
+// the diagrams.
 //
 // A machine is a pure function of (state, event, context): no clock, no input or output. Rows are tried in order; the
-// first whose guard agrees is taken. Guards are free functions on values; the action is a value that the owner carries out.
+// first whose guard agrees is taken. Guards are free functions on values; the action is a value that the
+// owner carries out.
 #pragma once
 
 #include <span>
@@ -31,7 +33,8 @@ struct Ignored {  // this event means nothing in this state, and that is intende
 
 template <typename State, typename Event, typename Action, typename Context>
 const Transition<State, Event, Action, Context>* find_transition(
-    std::span<const Transition<State, Event, Action, Context>> table, State from, Event on, const Context& context) {
+    std::span<const Transition<State, Event, Action, Context>> table, State from, Event on,
+    const Context& context) {
   for (const auto& row : table) {
     if (row.from == from && row.on == on && row.guard(context)) return &row;
   }

@@ -1,4 +1,5 @@
-// The controller without devices: how each end of a run becomes an exit code, and a summary that has no result in it.
+// The controller without devices: how each end of a run becomes an exit code, and a summary that has no
+// result in it.
 #include "firmware_like/controller.hpp"
 
 #include <doctest/doctest.h>
@@ -16,7 +17,8 @@ namespace {
 struct Bench {
   hal::VirtualClock clock;
   hal::Cable scanner{clock, {}}, robot{clock, {}};
-  std::unique_ptr<Controller> controller = std::make_unique<Controller>(default_config(), clock, scanner.host(), robot.host());
+  std::unique_ptr<Controller> controller =
+      std::make_unique<Controller>(default_config(), clock, scanner.host(), robot.host());
 
   void run_to_rest() {
     while (controller->tick() && clock.now() < 1min) {
@@ -26,7 +28,8 @@ struct Bench {
 
 }  // namespace
 
-TEST_CASE("devices that never answer: aborted after the configured time, by the name of the one that is missing") {
+TEST_CASE(
+    "devices that never answer: aborted after the configured time, by the name of the one that is missing") {
   Bench bench;
   bench.scanner.cut();
   bench.controller->start();
@@ -72,7 +75,8 @@ TEST_CASE("the timing report names every row of the task table") {
   const Json t = timing_of(*bench.controller);
   std::vector<std::string> names;
   for (const auto& task : t["tasks"]) names.push_back(task["name"]);
-  CHECK(names == std::vector<std::string>{"scanner in", "robot in", "cell", "robot out", "scanner out", "health"});
+  CHECK(names ==
+        std::vector<std::string>{"scanner in", "robot in", "cell", "robot out", "scanner out", "health"});
   CHECK(t["ticks"] == 300);
   CHECK(t["missed_ticks"] == 0);
   CHECK(t["tick_us"] == 1000.0);

@@ -15,7 +15,8 @@ const std::array<Vector2d, 4> corners{Vector2d{0, 0}, {700, 40}, {640, 400}, {-6
 std::vector<Vector2d> torn_outline(double depth, double pitch) {
   std::vector<Vector2d> points;
   for (std::size_t i = 0; i < 4; ++i) {
-    const Vector2d a = corners[i], d = corners[(i + 1) % 4] - a, along = d.normalized(), out{along.y(), -along.x()};
+    const Vector2d a = corners[i], d = corners[(i + 1) % 4] - a, along = d.normalized(),
+                   out{along.y(), -along.x()};
     for (double s = 1; s < d.norm(); s += 2) {
       const double phase = std::fmod(s, pitch) / pitch;
       points.push_back(a + s * along + depth * (phase - 0.5) * out);

@@ -232,7 +232,9 @@ TEST_CASE("a height that a coarse net holds exactly is found exactly, and the co
 TEST_CASE("what a coarser net misses decides against the tolerance which net is taken") {
   // A ripple of 4 micrometres rms and 40 mm wavelength: 4 spans cannot follow it, 32 can, and the data show it clearly.
   const PlanMap map(test::straight_outline(square));
-  const Height rippled = [](double x, double) { return 100 + 0.0057 * std::sin(x * 2 * std::numbers::pi / 40); };
+  const Height rippled = [](double x, double) {
+    return 100 + 0.0057 * std::sin(x * 2 * std::numbers::pi / 40);
+  };
   const auto shots = random_shots(map, rippled, 1, 60'000, 0.02, 0, 5);
   const auto spans_with = [&](double tolerance_mm) {
     SurfaceFit surface_fit({.max_spans_u = 32,

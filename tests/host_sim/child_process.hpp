@@ -1,5 +1,5 @@
-// A program under test as a child process: its output is kept in files, its end is waited for with a limit, and it
-// never outlives the test.
+// A program under test as a child process: its output is kept in files, its end is waited for with a limit,
+// and it never outlives the test.
 #pragma once
 
 #include <optional>

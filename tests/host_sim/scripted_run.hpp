@@ -1,6 +1,6 @@
-// A whole-cell run under virtual time in a folder of its own, watched from the first tick to the last: whatever a test
-// does to the cell, no motion is executed twice, the arm stays inside its limits, no accepted shot and no record is
-// lost.
+// A whole-cell run under virtual time in a folder of its own, watched from the first tick to the last:
+// whatever a test does to the cell, no motion is executed twice, the arm stays inside its limits, no accepted
+// shot and no record is lost.
 #pragma once
 
 #include <doctest/doctest.h>

@@ -1,4 +1,5 @@
-// Opens a serial device with the controller's own driver, sends PNG, prints the answer. Exit code 0 when one came.
+// Opens a serial device with the controller's own driver, sends PNG, prints the answer. Exit code 0 when one
+// came.
 #include <cstdio>
 #include <string>
 

@@ -115,7 +115,8 @@ TEST_CASE("a wall that faces the projector is hit between top and underside, and
   CHECK(on_wall == 500);
 }
 
-TEST_CASE("a raised edge's wall is as high as the plate is thick, and under it the ray goes on to the table") {
+TEST_CASE(
+    "a raised edge's wall is as high as the plate is thick, and under it the ray goes on to the table") {
   const auto plate = resting(Shape::saddle);  // raised by 20 at the middle of its left and right edges
   auto settings = without_noise();
   settings.cameras = {{0, 0, 500}};  // where the projector is: nothing that is lit is hidden

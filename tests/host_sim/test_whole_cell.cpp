@@ -18,7 +18,8 @@ TEST_CASE("the default run completes, and its summary says everything that it pr
   CHECK(s["plate"].get<std::string>().find("saddle") != std::string::npos);
   CHECK(s["seed"] == 1);
   CHECK(s["shots"]["boundary"].get<int>() >= 10);
-  CHECK(s["shots"]["surface"].get<int>() == 16);  // 305 mm is four fields of 102 mm with 10 mm of overlap, each way
+  CHECK(s["shots"]["surface"].get<int>() ==
+        16);  // 305 mm is four fields of 102 mm with 10 mm of overlap, each way
   CHECK(s["shots"]["retaken"] == 0);
   CHECK(s["points"]["total"].get<int>() == 50000 * static_cast<int>(cell.shots().size()));
   CHECK(s["points"]["used"].get<int>() > 500000);
@@ -26,7 +27,8 @@ TEST_CASE("the default run completes, and its summary says everything that it pr
   CHECK(s["boundary"]["corners_mm"].size() == 4);
   CHECK(s["surface"]["control_points"].size() == 2);
   CHECK(s["surface"]["rms_residual_mm"].get<double>() == doctest::Approx(0.051).epsilon(0.1));
-  CHECK(s["surface"]["sigma_mm"].get<double>() == doctest::Approx(0.051).epsilon(0.02));  // the scanner's own noise
+  CHECK(s["surface"]["sigma_mm"].get<double>() ==
+        doctest::Approx(0.051).epsilon(0.02));  // the scanner's own noise
   const double seconds = s["cycle"]["seconds"].get<double>();
   CHECK(seconds > 5);
   CHECK(seconds < 60);
@@ -61,7 +63,8 @@ TEST_CASE("the same seed gives the same bytes, another seed others") {
 }
 
 TEST_CASE("every shape with every outline is measured within the limits") {
-  const auto campaign = run_program({MOLDLOFT_SIM, "campaign", "--plates", "all", "--seeds", "1", "--json"}, 200s);
+  const auto campaign =
+      run_program({MOLDLOFT_SIM, "campaign", "--plates", "all", "--seeds", "1", "--json"}, 200s);
   REQUIRE_MESSAGE(campaign.exit_code == 0, campaign.out);
   const auto rows = Json::parse(campaign.out);
   CHECK(rows.size() == 24);

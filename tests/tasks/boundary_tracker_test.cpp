@@ -23,7 +23,8 @@ std::vector<Vector2d> placed(std::vector<Vector2d> corners, double turn) {
 const std::vector<Vector2d> square{{0, 0}, {305, 0}, {305, 305}, {0, 305}};
 const std::vector<Vector2d> rectangle{{0, 0}, {600, 0}, {600, 150}, {0, 150}};
 const std::vector<Vector2d> trapezoid{{0, 0}, {305, 0}, {245, 254}, {60, 254}};
-const std::vector<Vector2d> sheared{{0, 0}, {260, 0}, {390, 225}, {130, 225}};  // corners of 60 and 120 degrees
+const std::vector<Vector2d> sheared{
+    {0, 0}, {260, 0}, {390, 225}, {130, 225}};  // corners of 60 and 120 degrees
 
 double distance_to_outline(const Vector2d& p, const std::vector<Vector2d>& outline) {
   double least = 1e9;
@@ -56,7 +57,8 @@ TEST_CASE("the loop closes on every four-sided plate, however it is turned, and 
   }
 }
 
-TEST_CASE("every edge point that is remembered lies on the outline, and the outline has no stretch without one") {
+TEST_CASE(
+    "every edge point that is remembered lies on the outline, and the outline has no stretch without one") {
   BoundaryTracker tracker{TrackerSettings{.overlap_mm = 45}};
   const FlatWorld world{.outline = placed(trapezoid, 0.7)};
   REQUIRE(walk_round(tracker, world, start).last.to == TrackState::closed);
@@ -80,7 +82,8 @@ TEST_CASE("a boundary parallel to the stripes is found by turning the head") {
   CHECK(walk.turns == 1);  // the first turn crosses both the boundary and where the stripes were
 }
 
-TEST_CASE("where the boundary hides, the head turns so that stripes cross both what was seen and what hides") {
+TEST_CASE(
+    "where the boundary hides, the head turns so that stripes cross both what was seen and what hides") {
   BoundaryTracker tracker{TrackerSettings{}};
   tracker.begin(start);
   // A straight piece along world +x through the field's middle, made by hand: scanner at yaw 0, stripes along y.

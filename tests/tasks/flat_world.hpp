@@ -63,8 +63,8 @@ inline Walk walk_round(BoundaryTracker& tracker, const FlatWorld& world, const S
     }
     // Without a table height to tell them apart the higher of the two levels is the plate.
     const double table_z = world.table_z + 1 - place.centre.z();
-    const bool on_plate = view.found() &&
-                          frame.z[view.runs().front().first + view.runs().front().stripe * 500u] > table_z;
+    const bool on_plate =
+        view.found() && frame.z[view.runs().front().first + view.runs().front().stripe * 500u] > table_z;
     walk.last = tracker.take({.world_from_scanner = motion,
                               .plate_found = on_plate,
                               .plate_z_mm = world.plate_z,

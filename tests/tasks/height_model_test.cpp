@@ -8,7 +8,9 @@ using moldloft::tasks::HeightModel;
 
 TEST_CASE("a quadric plate is found from points round its border") {
   HeightModel model;
-  const auto z = [](double x, double y) { return 12 + 0.02 * x + 4e-4 * x * x - 4e-4 * y * y + 1e-4 * x * y; };
+  const auto z = [](double x, double y) {
+    return 12 + 0.02 * x + 4e-4 * x * x - 4e-4 * y * y + 1e-4 * x * y;
+  };
   for (double t = 0; t < 6.28; t += 0.05) {
     const double x = 500 + 150 * std::cos(t), y = 20 + 150 * std::sin(t);
     model.add({x, y, z(x - 500, y - 20)});

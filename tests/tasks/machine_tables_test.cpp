@@ -1,5 +1,5 @@
-// The tables are complete: every pair of state and event is listed or explicitly ignored, never both, and every state
-// can be reached.
+// The tables are complete: every pair of state and event is listed or explicitly ignored, never both, and
+// every state can be reached.
 #include <doctest/doctest.h>
 
 #include <set>
@@ -74,6 +74,7 @@ TEST_CASE("abort is taken from every state but those that have aborted already")
   for (int s = 0; s < cell_state_count; ++s) {
     const auto state = static_cast<CellState>(s);
     const bool aborted = state == CellState::aborting || state == CellState::aborted;
-    CHECK((find_transition(cell_transitions(), state, CellEvent::abort, CellContext{}) == nullptr) == aborted);
+    CHECK((find_transition(cell_transitions(), state, CellEvent::abort, CellContext{}) == nullptr) ==
+          aborted);
   }
 }

@@ -17,7 +17,8 @@ geometry::Outline straight(const std::array<Vector2d, 4>& corners) {
   for (std::size_t i = 0; i < 4; ++i) {
     auto& side = outline.sides[i];
     side.knots = geometry::uniform_clamped_knots(1);
-    for (int k = 0; k < 4; ++k) side.control.push_back(corners[i] + (corners[(i + 1) % 4] - corners[i]) * k / 3.0);
+    for (int k = 0; k < 4; ++k)
+      side.control.push_back(corners[i] + (corners[(i + 1) % 4] - corners[i]) * k / 3.0);
   }
   return outline;
 }
@@ -35,7 +36,8 @@ bool covered(const Vector2d& p, std::span<const ShotPlace> places, const ScanPla
   return false;
 }
 
-bool covers_all(const geometry::Outline& outline, std::span<const ShotPlace> places, const ScanPlanSettings& s) {
+bool covers_all(const geometry::Outline& outline, std::span<const ShotPlace> places,
+                const ScanPlanSettings& s) {
   const auto& c = outline.corners;
   for (double u = 0; u <= 1.0001; u += 0.02) {
     for (double v = 0; v <= 1.0001; v += 0.02) {

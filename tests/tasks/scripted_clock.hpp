@@ -39,7 +39,8 @@ class ScriptedTask final : public Task {
 
 class ScriptedBackground final : public BackgroundTask {
  public:
-  ScriptedBackground(ScriptedClock& clock, int how_many, Duration each) : pieces{how_many}, cost{each}, clock_{clock} {}
+  ScriptedBackground(ScriptedClock& clock, int how_many, Duration each)
+      : pieces{how_many}, cost{each}, clock_{clock} {}
   bool has_work() const override { return pieces > 0; }
   void step(Instant) override {
     starts.push_back(clock_.now());

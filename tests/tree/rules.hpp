@@ -1,5 +1,5 @@
-// The rules of the tree (its arrows, its names, its measures) as functions on paths and text, so that a test can feed
-// them what is wrong as well as the tree itself. Every finding is one line: where, and what to do.
+// The rules of the tree (its arrows, its names, its measures) as functions on paths and text, so that a test
+// can feed them what is wrong as well as the tree itself. Every finding is one line: where, and what to do.
 #pragma once
 
 #include <span>
