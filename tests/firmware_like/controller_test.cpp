@@ -16,7 +16,8 @@ namespace {
 struct Bench {
   hal::VirtualClock clock;
   hal::Cable scanner{clock, {}}, robot{clock, {}};
-  std::unique_ptr<Controller> controller = std::make_unique<Controller>(default_config(), clock, scanner.host(), robot.host());
+  std::unique_ptr<Controller> controller =
+      std::make_unique<Controller>(default_config(), clock, scanner.host(), robot.host());
 
   void run_to_rest() {
     while (controller->tick() && clock.now() < 1min) {
@@ -26,7 +27,8 @@ struct Bench {
 
 }  // namespace
 
-TEST_CASE("devices that never answer: aborted after the configured time, by the name of the one that is missing") {
+TEST_CASE(
+    "devices that never answer: aborted after the configured time, by the name of the one that is missing") {
   Bench bench;
   bench.scanner.cut();
   bench.controller->start();
@@ -72,7 +74,8 @@ TEST_CASE("the timing report names every row of the task table") {
   const Json t = timing_of(*bench.controller);
   std::vector<std::string> names;
   for (const auto& task : t["tasks"]) names.push_back(task["name"]);
-  CHECK(names == std::vector<std::string>{"scanner in", "robot in", "cell", "robot out", "scanner out", "health"});
+  CHECK(names ==
+        std::vector<std::string>{"scanner in", "robot in", "cell", "robot out", "scanner out", "health"});
   CHECK(t["ticks"] == 300);
   CHECK(t["missed_ticks"] == 0);
   CHECK(t["tick_us"] == 1000.0);

@@ -49,7 +49,8 @@ TEST_CASE("no subsystem has used more than its plan, and each is named once") {
 }
 
 TEST_CASE("a larger plate asks for more, frame by frame, edge by edge, span by span") {
-  const auto small = plan_for("[plate]\nlargest_mm = [300, 300]"), large = plan_for("[plate]\nlargest_mm = [1500, 700]");
+  const auto small = plan_for("[plate]\nlargest_mm = [300, 300]"),
+             large = plan_for("[plate]\nlargest_mm = [1500, 700]");
   for (const char* grows : {"cell and tracker", "outline", "boundary reserve", "surface fit"}) {
     CAPTURE(grows);
     CHECK(bytes_of(large, grows) > bytes_of(small, grows));
@@ -60,7 +61,8 @@ TEST_CASE("a larger plate asks for more, frame by frame, edge by edge, span by s
 
 TEST_CASE("larger frames ask for more where frames are kept") {
   const auto small = plan_for(""), large = plan_for("[scanner]\nmax_points_per_stripe = 1000");
-  CHECK(bytes_of(large, "recorder rings") > 1.9 * static_cast<double>(bytes_of(small, "recorder rings") - (1u << 20)));
+  CHECK(bytes_of(large, "recorder rings") >
+        1.9 * static_cast<double>(bytes_of(small, "recorder rings") - (1u << 20)));
   CHECK(bytes_of(large, "cell and tracker") > bytes_of(small, "cell and tracker"));
   CHECK(total_plan(plan_for("[scanner]\nencoding = \"float32\"")) > total_plan(small));
 }

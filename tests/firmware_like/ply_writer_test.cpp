@@ -105,7 +105,12 @@ geometry::BSplineSurface rectangle() {
 
 TEST_CASE("points come back as they were, with unit and frame in the header") {
   const std::vector<MeasuredPoint> points = {
-      {.position = {1.5f, -2.25f, 3.125f}, .residual_mm = 0.0625f, .shot = 17, .stripe = 99, .u = 0.5f, .v = 0.5f},
+      {.position = {1.5f, -2.25f, 3.125f},
+       .residual_mm = 0.0625f,
+       .shot = 17,
+       .stripe = 99,
+       .u = 0.5f,
+       .v = 0.5f},
       {.position = {-1e-3f, 1e6f, 0.0f}, .residual_mm = -0.5f, .shot = 4095, .stripe = 0, .u = 0, .v = 0},
   };
   const auto ply = read(points_ply(points));

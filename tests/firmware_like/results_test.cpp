@@ -59,7 +59,8 @@ TEST_CASE("a folder that is not there is told by the file's path") {
   const hal::TemporaryFolder folder;
   const auto refused = write_file(folder.file("none/summary.json"), "x");
   REQUIRE_FALSE(refused.has_value());
-  CHECK(refused.error().what == folder.file("none/summary.json") + ": cannot be written; is the disk full or read-only?");
+  CHECK(refused.error().what ==
+        folder.file("none/summary.json") + ": cannot be written; is the disk full or read-only?");
 }
 
 TEST_CASE("a surface as JSON: unit, frame, degree, knots, and the net row by row along u") {
@@ -88,7 +89,8 @@ TEST_CASE("a surface as JSON: unit, frame, degree, knots, and the net row by row
       const auto point = j["control"][i][k];
       CHECK(point[0].get<double>() == static_cast<double>(i));
       CHECK(point[1].get<double>() == 10.0 * static_cast<double>(k));
-      CHECK(point[2].get<double>() == s.z(static_cast<int>(i), static_cast<int>(k)));  // no digit is lost on the way
+      CHECK(point[2].get<double>() ==
+            s.z(static_cast<int>(i), static_cast<int>(k)));  // no digit is lost on the way
     }
   }
 }
@@ -97,17 +99,24 @@ TEST_CASE("the result table shows what the summary holds, and leaves out what it
   Json s = {{"result", "complete"},
             {"shots", {{"seek", 2}, {"boundary", 14}, {"surface", 16}, {"retaken", 1}}},
             {"points", {{"total", 1600000}, {"used", 794087}}},
-            {"boundary", {{"corners_mm", {{692.931, 115.07}, {415.38, 241.23}, {289.12, -36.51}, {566.86, -162.65}}}}},
+            {"boundary",
+             {{"corners_mm", {{692.931, 115.07}, {415.38, 241.23}, {289.12, -36.51}, {566.86, -162.65}}}}},
             {"surface", {{"control_points", {7, 7}}, {"sigma_mm", 0.0509}, {"shot_offset_rms_mm", 0.0147}}},
             {"cycle", {{"seconds", 17.71}, {"standing_fraction", 0.18}, {"idle_fraction", 0.044}}}};
   const std::string table = result_table(s, "out/run-1");
-  CHECK(table.find("shots                       2 seeking, 14 boundary, 16 surface, 1 retaken\n") != std::string::npos);
+  CHECK(table.find("shots                       2 seeking, 14 boundary, 16 surface, 1 retaken\n") !=
+        std::string::npos);
   CHECK(table.find("points used                 794087 of 1600000\n") != std::string::npos);
   CHECK(table.find("(692.93, 115.07) (415.38, 241.23)") != std::string::npos);
   CHECK(table.find("7 x 7 control points\n") != std::string::npos);
-  CHECK(table.find("cell time, s                17.7 (arm standing 18 %, idle 4.4 %)\n") != std::string::npos);
+  CHECK(table.find("cell time, s                17.7 (arm standing 18 %, idle 4.4 %)\n") !=
+        std::string::npos);
   CHECK(table.find("run folder                  out/run-1\n") != std::string::npos);
   CHECK(table.find("truth") == std::string::npos);
-  s["truth"] = {{"normal_rms_mm", 0.0015}, {"normal_max_mm", 0.0075}, {"outline_max_mm", 0.083}, {"corner_max_mm", 0.073}};
-  CHECK(result_table(s, "").find("normal rms 0.0015, max 0.0075; outline max 0.083; corner max 0.073\n") != std::string::npos);
+  s["truth"] = {{"normal_rms_mm", 0.0015},
+                {"normal_max_mm", 0.0075},
+                {"outline_max_mm", 0.083},
+                {"corner_max_mm", 0.073}};
+  CHECK(result_table(s, "").find("normal rms 0.0015, max 0.0075; outline max 0.083; corner max 0.073\n") !=
+        std::string::npos);
 }

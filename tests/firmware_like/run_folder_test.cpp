@@ -46,7 +46,8 @@ TEST_CASE("a folder that cannot be made is refused with its path and the reason"
 }
 
 TEST_CASE("a folder that cannot be written is refused before anything moves") {
-  const auto run = create_run("/proc/self", config, RunKind::measured);  // is there, and takes no file from anybody
+  const auto run =
+      create_run("/proc/self", config, RunKind::measured);  // is there, and takes no file from anybody
   REQUIRE_FALSE(run.has_value());
   CHECK(run.error().what.starts_with("/proc/self/run.db: cannot be written"));
 }
@@ -57,7 +58,8 @@ TEST_CASE("a measured run is never overwritten, neither by a measured nor by a s
   REQUIRE(create_run(path, config, RunKind::measured).has_value());
   CHECK(refused(create_run(path, config, RunKind::measured)) ==
         path + ": holds a run already; give another --out, or --resume to go on with it");
-  CHECK(refused(create_run(path, config, RunKind::simulated)) == path + ": holds a run already; give another --out");
+  CHECK(refused(create_run(path, config, RunKind::simulated)) ==
+        path + ": holds a run already; give another --out");
   CHECK(open_run(path).has_value());
 }
 
@@ -72,17 +74,21 @@ TEST_CASE("a simulated run, which its seed brings back, makes room for another s
   CHECK(*again->store->meta("config") == "[start]\nyaw_deg = 4\n");
 }
 
-TEST_CASE("a run is resumed with the configuration that it was begun with, whatever the devices' addresses are today") {
+TEST_CASE(
+    "a run is resumed with the configuration that it was begun with, whatever the devices' addresses are "
+    "today") {
   const hal::TemporaryFolder folder;
   const std::string path = folder.file("run");
   REQUIRE(create_run(path, config, RunKind::measured).has_value());
   CHECK(resume_run(path, config).has_value());
   CHECK(resume_run(path, config + "[scanner]\nport = 9\n").has_value());
   CHECK(refused(resume_run(path, "[start]\nyaw_deg = 4\n")) ==
-        path + ": was begun with another configuration ('start.yaw_deg' differs); resume it with the same, or begin a new run with another --out");
+        path +
+            ": was begun with another configuration ('start.yaw_deg' differs); resume it with the same, or "
+            "begin a new run with another --out");
 }
 
-TEST_CASE("what is resumed is appended to; what is opened to be read is not") {
+TEST_CASE("what is resumed is appended to, what is opened to be read is not") {
   const hal::TemporaryFolder folder;
   const std::string path = folder.file("run");
   REQUIRE(create_run(path, config, RunKind::measured).has_value());
@@ -97,12 +103,14 @@ TEST_CASE("what is resumed is appended to; what is opened to be read is not") {
   CHECK_FALSE(read->store->set_meta("note", "changed").has_value());
 }
 
-TEST_CASE("a folder without a run, or with something else under the store's name, is refused by what is wrong") {
+TEST_CASE(
+    "a folder without a run, or with something else under the store's name, is refused by what is wrong") {
   const hal::TemporaryFolder folder;
   const std::string path = folder.path();
   CHECK(refused(open_run(path)) == path + ": no run.db there; give the folder of a run");
   CHECK(refused(resume_run(path, config)) == path + ": no run.db there; give the folder of a run");
-  CHECK(refused(open_run(folder.file("none"))) == folder.file("none") + ": no run.db there; give the folder of a run");
+  CHECK(refused(open_run(folder.file("none"))) ==
+        folder.file("none") + ": no run.db there; give the folder of a run");
   std::ofstream{folder.file("run.db")} << "these are no tables\n";
   CHECK(refused(open_run(path)) == folder.file("run.db") + ": is not a run store");
 }

@@ -30,8 +30,8 @@ class HeapAllowed {
   bool before_;
 };
 
-// Calls that counted on this thread since they were last forgotten. With MOLDLOFT_HEAP_STACK in the environment the first
-// one's stack goes to standard error.
+// Calls that counted on this thread since they were last forgotten. With MOLDLOFT_HEAP_STACK in the
+// environment the first one's stack goes to standard error.
 std::size_t heap_calls() noexcept;
 void forget_heap_calls() noexcept;
 

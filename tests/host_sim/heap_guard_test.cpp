@@ -1,6 +1,6 @@
-// The control thread's promise for the whole controller: after start() and the first ticks, tick() touches the heap not
-// once, whatever happens to the cell. What the simulated world does in its own step does not count, nor does the drain of
-// the recorder, which is another thread's on a real cell.
+// The control thread's promise for the whole controller: after start() and the first ticks, tick() touches
+// the heap not once, whatever happens to the cell. What the simulated world does in its own step does not
+// count, nor does the drain of the recorder, which is another thread's on a real cell.
 #include "host_sim/heap_guard.hpp"
 
 #include <doctest/doctest.h>
@@ -10,11 +10,11 @@
 #include <memory>
 #include <vector>
 
+#include "firmware_like/controller.hpp"
 #include "firmware_like/run_folder.hpp"
 #include "hal/cable.hpp"
 #include "hal/temporary_folder.hpp"
 #include "host_sim/cell_config.hpp"
-#include "firmware_like/controller.hpp"
 #include "host_sim/world.hpp"
 
 using namespace moldloft;
@@ -45,11 +45,13 @@ struct Cell {
   explicit Cell(const CellDescription& d = {}, const std::string& folder_of_a_run = {}) : description{d} {
     const auto plate = *placed_plate(description);
     const std::string text = cell_toml(description, plate);
-    auto folder = folder_of_a_run.empty() ? firmware_like::create_run(own_folder.file("run"), text, firmware_like::RunKind::simulated)
+    auto folder = folder_of_a_run.empty() ? firmware_like::create_run(own_folder.file("run"), text,
+                                                                      firmware_like::RunKind::simulated)
                                           : firmware_like::resume_run(folder_of_a_run, text);
     REQUIRE(folder.has_value());
     run = std::move(*folder);
-    world = std::make_unique<SimulatedWorld>(description, plate, scanner_cable.device(), robot_cable.device());
+    world =
+        std::make_unique<SimulatedWorld>(description, plate, scanner_cable.device(), robot_cable.device());
     clock.carry(*world);
     controller = std::make_unique<firmware_like::Controller>(
         *firmware_like::parse_config(text, "cell.toml"), clock, scanner_cable.host(), robot_cable.host(),
@@ -89,7 +91,8 @@ int surface_shots(const Cell& cell) { return cell.controller->cell().shots_taken
 
 }  // namespace
 
-TEST_CASE("the guard sees every way to the heap, on its own thread and while it is on" * doctest::skip(!test::heap_guard_works)) {
+TEST_CASE("the guard sees every way to the heap, on its own thread and while it is on" *
+          doctest::skip(!test::heap_guard_works)) {
   std::vector<int> grows;
   const auto seen = [](auto&& work) {
     test::forget_heap_calls();
@@ -102,25 +105,33 @@ TEST_CASE("the guard sees every way to the heap, on its own thread and while it 
   CHECK(seen([&] { memory = std::malloc(10); }) == 1);
   CHECK(seen([&] { memory = std::realloc(memory, 10'000); }) >= 1);
   CHECK(seen([&] { std::free(memory); }) == 1);
-  CHECK(seen([&] { memory = std::calloc(3, 4); std::free(memory); }) == 2);
-  CHECK(seen([&] { memory = std::aligned_alloc(64, 128); std::free(memory); }) == 2);
+  CHECK(seen([&] {
+          memory = std::calloc(3, 4);
+          std::free(memory);
+        }) == 2);
+  CHECK(seen([&] {
+          memory = std::aligned_alloc(64, 128);
+          std::free(memory);
+        }) == 2);
   CHECK(seen([] { delete new (std::align_val_t{64}) int{1}; }) >= 1);
   CHECK(seen([&] { grows.resize(1000); }) >= 1);
   CHECK(seen([&] {
-    const test::HeapAllowed here;
-    grows.resize(10'000);
-  }) == 0);
+          const test::HeapAllowed here;
+          grows.resize(10'000);
+        }) == 0);
   CHECK(seen([] {}) == 0);
 }
 
-TEST_CASE("a complete run touches the heap in no tick after the first" * doctest::skip(!test::heap_guard_works)) {
+TEST_CASE("a complete run touches the heap in no tick after the first" *
+          doctest::skip(!test::heap_guard_works)) {
   Cell cell;
   CHECK(cell.run_guarded() == tasks::CellState::complete);
   CHECK(heap_calls() == 0);
   CHECK(surface_shots(cell) == 16);
 }
 
-TEST_CASE("nor does a run with a curved plate of another outline under the gantry" * doctest::skip(!test::heap_guard_works)) {
+TEST_CASE("nor does a run with a curved plate of another outline under the gantry" *
+          doctest::skip(!test::heap_guard_works)) {
   CellDescription d;
   d.plate = "wave";
   d.outline = OutlineKind::trapezoid;
@@ -131,7 +142,8 @@ TEST_CASE("nor does a run with a curved plate of another outline under the gantr
   CHECK(heap_calls() == 0);
 }
 
-TEST_CASE("nor do a lost link, a restarted scanner and a store that stands still" * doctest::skip(!test::heap_guard_works)) {
+TEST_CASE("nor do a lost link, a restarted scanner and a store that stands still" *
+          doctest::skip(!test::heap_guard_works)) {
   Cell cell;
   int step = 0;
   hal::Instant at{0};
@@ -163,7 +175,8 @@ TEST_CASE("nor do an emergency stop and the loss of the robot" * doctest::skip(!
   }
 }
 
-TEST_CASE("nor does a resumed run, which begins with the shots of its archive" * doctest::skip(!test::heap_guard_works)) {
+TEST_CASE("nor does a resumed run, which begins with the shots of its archive" *
+          doctest::skip(!test::heap_guard_works)) {
   Cell first;
   CHECK(first.run_guarded([&](hal::Instant) {
     if (surface_shots(first) == 5) first.controller->cell().command(tasks::CellEvent::stop);

@@ -1,5 +1,6 @@
-// Bad input to the real programs, as a user meets it: one line on standard error that names what, where and what to do, an
-// exit code that is not 0, nothing on standard output, and nothing left behind that would block the next try.
+// Bad input to the real programs, as a user meets it: one line on standard error that names what, where and
+// what to do, an exit code that is not 0, nothing on standard output, and nothing left behind that would
+// block the next try.
 #include <doctest/doctest.h>
 
 #include <csignal>
@@ -41,7 +42,8 @@ class Workbench {
   hal::TemporaryFolder folder_;
 };
 
-void check_refused(const Finished& program, const std::string& line, int exit_code = firmware_like::exit_failed) {
+void check_refused(const Finished& program, const std::string& line,
+                   int exit_code = firmware_like::exit_failed) {
   CHECK(program.exit_code == exit_code);
   CHECK(program.err == line + "\n");
   CHECK(program.out == "");
@@ -57,10 +59,13 @@ TEST_CASE("a configuration that is wrong is refused with file and line, and no r
     check_refused(run_program({MOLDLOFT, "run", config, "--out", out}), "moldloft: " + config + what);
     CHECK_FALSE(fs::exists(out));
   };
-  refuses("baud", "bauds = 9600", ":29: [robot] bauds: unknown key; known here: baud, device, driver, repeatability_z_mm, speed_percent, workspace");
+  refuses("baud", "bauds = 9600",
+          ":29: [robot] bauds: unknown key; known here: baud, device, driver, repeatability_z_mm, "
+          "speed_percent, workspace");
   refuses("baud", "baud = \"9600\"", ":29: [robot] baud: a whole number is wanted");
   refuses("baud", "baud = 12", ":29: [robot] baud: 12 is outside 1200 to 921600");
-  refuses("x_mm", "x_mm = [800, -800]", ":34: [robot.workspace] x_mm: from 800 to -800 is no range: the smaller number comes first");
+  refuses("x_mm", "x_mm = [800, -800]",
+          ":34: [robot.workspace] x_mm: from 800 to -800 is no range: the smaller number comes first");
 }
 
 TEST_CASE("a configuration that is not there is refused by its path") {
@@ -71,25 +76,31 @@ TEST_CASE("a configuration that is not there is refused by its path") {
 TEST_CASE("no scanner server: one line after the configured time, and the folder is free for the next try") {
   const Workbench bench;
   // Port 1 is nobody's on a machine that runs tests.
-  const std::string config = bench.write("cell.toml", "[cell]\ndevice_timeout_s = 0.5\n[scanner]\nport = 1\n");
+  const std::string config =
+      bench.write("cell.toml", "[cell]\ndevice_timeout_s = 0.5\n[scanner]\nport = 1\n");
   for (int attempt = 0; attempt < 2; ++attempt) {
-    check_refused(run_program({MOLDLOFT, "run", config, "--out", bench.path("run")}),
-                  "moldloft: scanner: 127.0.0.1:1: Connection refused (is the server running?); nothing was measured");
+    check_refused(
+        run_program({MOLDLOFT, "run", config, "--out", bench.path("run")}),
+        "moldloft: scanner: 127.0.0.1:1: Connection refused (is the server running?); nothing was measured");
     CHECK_FALSE(fs::exists(bench.path("run")));
   }
 }
 
 TEST_CASE("no serial device: one line that names the device") {
   const Workbench bench;
-  ChildProcess devices{{MOLDLOFT_SIM, "devices", "--scanner-port", "0", "--robot-pty", bench.path("robot"), "--cell", bench.path("fits.toml")}};
+  ChildProcess devices{{MOLDLOFT_SIM, "devices", "--scanner-port", "0", "--robot-pty", bench.path("robot"),
+                        "--cell", bench.path("fits.toml")}};
   REQUIRE_MESSAGE(devices.prints("ready:", 20s), devices.err());
   const std::string fits = text_of(bench.path("fits.toml"));
-  const std::string port = fits.substr(fits.find("port = "), fits.find('\n', fits.find("port = ")) - fits.find("port = "));
+  const std::string port =
+      fits.substr(fits.find("port = "), fits.find('\n', fits.find("port = ")) - fits.find("port = "));
   const auto with_device = [&](const std::string& device) {
-    return bench.write("cell.toml", "[cell]\ndevice_timeout_s = 0.5\n[scanner]\n" + port + "\n[robot]\ndevice = \"" + device + "\"\n");
+    return bench.write("cell.toml", "[cell]\ndevice_timeout_s = 0.5\n[scanner]\n" + port +
+                                        "\n[robot]\ndevice = \"" + device + "\"\n");
   };
   check_refused(run_program({MOLDLOFT, "run", with_device("/dev/ttyNONE"), "--out", bench.path("run")}),
-                "moldloft: robot: /dev/ttyNONE does not exist: is the robot's cable plugged in, is the name right?; nothing was measured");
+                "moldloft: robot: /dev/ttyNONE does not exist: is the robot's cable plugged in, is the name "
+                "right?; nothing was measured");
   check_refused(run_program({MOLDLOFT, "run", with_device("/dev/null"), "--out", bench.path("run")}),
                 "moldloft: robot: /dev/null is not a serial port; nothing was measured");
   CHECK_FALSE(fs::exists(bench.path("run")));
@@ -113,8 +124,10 @@ TEST_CASE("an output folder that cannot be written is refused before the devices
   for (const std::string program : {"run", "cell"}) {
     CAPTURE(program);
     const bool real = program == "run";
-    const auto refused = real ? run_program({MOLDLOFT, "run", config, "--out", file + "/run"}) : run_program({MOLDLOFT_SIM, "cell", "--out", file + "/run"});
-    check_refused(refused, (real ? "moldloft: " : "moldloft-sim cell: ") + file + "/run: cannot be created (Not a directory); give another --out");
+    const auto refused = real ? run_program({MOLDLOFT, "run", config, "--out", file + "/run"})
+                              : run_program({MOLDLOFT_SIM, "cell", "--out", file + "/run"});
+    check_refused(refused, (real ? "moldloft: " : "moldloft-sim cell: ") + file +
+                               "/run: cannot be created (Not a directory); give another --out");
   }
 }
 
@@ -123,12 +136,16 @@ TEST_CASE("a folder that holds a run is never overwritten, and resumed only with
   const std::string run = bench.path("run"), config = bench.example("", "");
   REQUIRE(run_program({MOLDLOFT_SIM, "cell", "--out", run}).exit_code == 0);
   const auto size = fs::file_size(run + "/run.db");
-  check_refused(run_program({MOLDLOFT, "run", config, "--out", run}),
-                "moldloft: " + run + ": holds a run already; give another --out, or --resume to go on with it");
-  check_refused(run_program({MOLDLOFT, "run", config, "--out", run, "--resume"}),
-                "moldloft: " + run + ": was begun with another configuration ('plate.largest_mm' differs); resume it with the same, or "
-                "begin a new run with another --out");
-  check_refused(run_program({MOLDLOFT, "fit", run, "--out", run}), "moldloft: " + run + ": is the run itself; give another folder with --out");
+  check_refused(
+      run_program({MOLDLOFT, "run", config, "--out", run}),
+      "moldloft: " + run + ": holds a run already; give another --out, or --resume to go on with it");
+  check_refused(
+      run_program({MOLDLOFT, "run", config, "--out", run, "--resume"}),
+      "moldloft: " + run +
+          ": was begun with another configuration ('plate.largest_mm' differs); resume it with the same, or "
+          "begin a new run with another --out");
+  check_refused(run_program({MOLDLOFT, "fit", run, "--out", run}),
+                "moldloft: " + run + ": is the run itself; give another folder with --out");
   CHECK(fs::file_size(run + "/run.db") == size);
 }
 
@@ -138,23 +155,29 @@ TEST_CASE("a folder that holds no run is neither resumed nor fitted") {
   const std::string why = "moldloft: " + nothing + ": no run.db there; give the folder of a run";
   check_refused(run_program({MOLDLOFT, "run", config, "--out", nothing, "--resume"}), why);
   check_refused(run_program({MOLDLOFT, "fit", nothing, "--out", bench.path("fit")}), why);
-  check_refused(run_program({MOLDLOFT, "run", config, "--resume"}), "moldloft: --resume: give the run's folder with --out");
+  check_refused(run_program({MOLDLOFT, "run", config, "--resume"}),
+                "moldloft: --resume: give the run's folder with --out");
   fs::create_directories(nothing);
   bench.write("nothing/run.db", "these are no tables");
-  check_refused(run_program({MOLDLOFT, "fit", nothing, "--out", bench.path("fit")}), "moldloft: " + nothing + "/run.db: is not a run store");
+  check_refused(run_program({MOLDLOFT, "fit", nothing, "--out", bench.path("fit")}),
+                "moldloft: " + nothing + "/run.db: is not a run store");
 }
 
 TEST_CASE("a plate that is none is refused by what is wrong with it") {
   const Workbench bench;
   const std::string no_ply = bench.write("panel.ply", "solid panel\n"), out = bench.path("run");
-  check_refused(run_program({MOLDLOFT_SIM, "cell", "--plate", no_ply, "--out", out}), "moldloft-sim cell: " + no_ply + ": not a PLY file");
+  check_refused(run_program({MOLDLOFT_SIM, "cell", "--plate", no_ply, "--out", out}),
+                "moldloft-sim cell: " + no_ply + ": not a PLY file");
   check_refused(run_program({MOLDLOFT_SIM, "cell", "--plate", bench.path("none.ply"), "--out", out}),
                 "moldloft-sim cell: " + bench.path("none.ply") + ": cannot be opened");
-  check_refused(run_program({MOLDLOFT_SIM, "devices", "--plate", no_ply}), "moldloft-sim devices: " + no_ply + ": not a PLY file");
+  check_refused(run_program({MOLDLOFT_SIM, "devices", "--plate", no_ply}),
+                "moldloft-sim devices: " + no_ply + ": not a PLY file");
   check_refused(run_program({MOLDLOFT_SIM, "cell", "--plate", "cube", "--out", out}),
-                "moldloft-sim cell: no plate is called 'cube': choose flat, cylinder, saddle, twist, dome, wave, or a file that ends in .ply");
+                "moldloft-sim cell: no plate is called 'cube': choose flat, cylinder, saddle, twist, dome, "
+                "wave, or a file that ends in .ply");
   check_refused(run_program({MOLDLOFT_SIM, "cell", "--width", "900", "--out", out}),
-                "moldloft-sim cell: plate 'saddle' (900 x 900 mm) does not fit under the scara arm: choose a smaller plate, another place or "
+                "moldloft-sim cell: plate 'saddle' (900 x 900 mm) does not fit under the scara arm: choose a "
+                "smaller plate, another place or "
                 "another arm");
   CHECK_FALSE(fs::exists(out));
 }

@@ -19,7 +19,8 @@ using nlohmann::json;
 
 namespace {
 
-constexpr auto run_limit = 90s;  // a run takes 18 s of cell time; the rest is for a machine that does other things too
+constexpr auto run_limit =
+    90s;  // a run takes 18 s of cell time; the rest is for a machine that does other things too
 
 // The simulated devices, ready to be connected to.
 class Devices {
@@ -32,14 +33,17 @@ class Devices {
   std::string config_with(const std::string& begins, const std::string& line) const {
     std::istringstream lines{text_of(config())};
     std::ofstream changed{folder_.file("changed.toml")};
-    for (std::string old; std::getline(lines, old);) changed << (old.starts_with(begins) ? line : old) << "\n";
+    for (std::string old; std::getline(lines, old);)
+      changed << (old.starts_with(begins) ? line : old) << "\n";
     return folder_.file("changed.toml");
   }
 
  private:
-  static std::vector<std::string> words(const hal::TemporaryFolder& folder, const std::vector<std::string>& more) {
-    std::vector<std::string> all = {MOLDLOFT_SIM, "devices", "--scanner-port", "0", "--robot-pty", folder.file("robot"),
-                                    "--cell",     folder.file("cell.toml")};
+  static std::vector<std::string> words(const hal::TemporaryFolder& folder,
+                                        const std::vector<std::string>& more) {
+    std::vector<std::string> all = {
+        MOLDLOFT_SIM,         "devices", "--scanner-port",        "0", "--robot-pty",
+        folder.file("robot"), "--cell",  folder.file("cell.toml")};
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }
@@ -102,7 +106,9 @@ void check_fit_repeats(const std::string& run, const std::string& out) {
 
 }  // namespace
 
-TEST_CASE("the deployed program measures a plate over a socket and a serial port, and its run can be fitted again") {
+TEST_CASE(
+    "the deployed program measures a plate over a socket and a serial port, and its run can be fitted "
+    "again") {
   const Devices devices;
   const hal::TemporaryFolder folder;
   const std::string out = folder.file("run");
@@ -150,7 +156,8 @@ TEST_CASE("a run that ctrl-C stops, then a power cut, goes on where it was with 
   check_fit_repeats(out, folder.file("fit"));
 }
 
-TEST_CASE("a start pose off the plate and a plate that leaves the workspace end in one line that says what to do") {
+TEST_CASE(
+    "a start pose off the plate and a plate that leaves the workspace end in one line that says what to do") {
   const Devices devices;
   const hal::TemporaryFolder folder;
   const auto last_line = [](const std::string& text) {
@@ -158,26 +165,35 @@ TEST_CASE("a start pose off the plate and a plate that leaves the workspace end 
     return before == std::string::npos ? text : text.substr(before + 1);
   };
   const auto saved = [&](const char* name) {
-    return ". What was measured is saved in " + folder.file(name) + " (overview.svg shows it); then begin a new run\n";
+    return ". What was measured is saved in " + folder.file(name) +
+           " (overview.svg shows it); then begin a new run\n";
   };
-  ChildProcess off{{MOLDLOFT, "run", devices.config_with("centre_mm", "centre_mm = [510, 400, 15]"), "--out", folder.file("off")}, PTY_MODEM};
+  ChildProcess off{{MOLDLOFT, "run", devices.config_with("centre_mm", "centre_mm = [510, 400, 15]"), "--out",
+                    folder.file("off")},
+                   PTY_MODEM};
   CHECK(off.wait(run_limit) == firmware_like::exit_held);
   CHECK(last_line(off.err()) ==
-        "moldloft: held: no plate under the scanner at x 510 y 400 mm: move [start] onto the plate" + saved("off"));
+        "moldloft: held: no plate under the scanner at x 510 y 400 mm: move [start] onto the plate" +
+            saved("off"));
   CHECK(off.out().empty());
   CHECK(stored_shots(folder.file("off")) == 1);
 
-  ChildProcess beyond{{MOLDLOFT, "run", devices.config_with("y_mm", "y_mm = [-800, 50]"), "--out", folder.file("beyond")}, PTY_MODEM};
+  ChildProcess beyond{
+      {MOLDLOFT, "run", devices.config_with("y_mm", "y_mm = [-800, 50]"), "--out", folder.file("beyond")},
+      PTY_MODEM};
   CHECK(beyond.wait(run_limit) == firmware_like::exit_aborted);
   CHECK(last_line(beyond.err()).starts_with("moldloft: aborted: target outside the workspace: y "));
-  CHECK(last_line(beyond.err()).ends_with(
-      " mm, limit -800.0 to 50.0 mm: move the plate, or widen [robot.workspace] if the arm may go there" + saved("beyond")));
+  CHECK(last_line(beyond.err())
+            .ends_with(" mm, limit -800.0 to 50.0 mm: move the plate, or widen [robot.workspace] if the arm "
+                       "may go there" +
+                       saved("beyond")));
   CHECK(beyond.out().empty());
   CHECK(stored_shots(folder.file("beyond")) > 1);
 
   // Nothing was measured here: no folder, and not a line before the one that says why.
   const std::string never = folder.file("never");
-  ChildProcess refused{{MOLDLOFT, "run", devices.config_with("x_mm", "x_mm = [-800, 50]"), "--out", never}, PTY_MODEM};
+  ChildProcess refused{{MOLDLOFT, "run", devices.config_with("x_mm", "x_mm = [-800, 50]"), "--out", never},
+                       PTY_MODEM};
   CHECK(refused.wait(run_limit) == firmware_like::exit_failed);
   CHECK(lines_in(refused.err()) == 1);
   CHECK(refused.err().starts_with("moldloft: target outside the workspace: x "));

@@ -16,8 +16,12 @@ using tasks::HoldCause;
 
 namespace {
 
-int surface_shots(const SimulatedCell& cell) { return cell.controller.cell().shots_taken(hal::ShotPurpose::surface); }
-int boundary_shots(const SimulatedCell& cell) { return cell.controller.cell().shots_taken(hal::ShotPurpose::boundary); }
+int surface_shots(const SimulatedCell& cell) {
+  return cell.controller.cell().shots_taken(hal::ShotPurpose::surface);
+}
+int boundary_shots(const SimulatedCell& cell) {
+  return cell.controller.cell().shots_taken(hal::ShotPurpose::boundary);
+}
 
 // Half-way through a frame: the controller knows by then that it was exposed, and lets the arm go.
 bool computes(const SimulatedCell& cell, hal::Instant now) {
@@ -48,7 +52,9 @@ class Once {
 };
 
 std::string message(const SimulatedRun& run) { return run.summary["message"]; }
-bool says(const SimulatedRun& run, std::string_view text) { return message(run).find(text) != std::string::npos; }
+bool says(const SimulatedRun& run, std::string_view text) {
+  return message(run).find(text) != std::string::npos;
+}
 
 // No file of this process takes a byte: what a full disk does to a store, without a disk of its own.
 class FullDisk {
@@ -69,7 +75,8 @@ class FullDisk {
 
 }  // namespace
 
-TEST_CASE("scanner cable cut while it computes: the cell holds, reconnects, gets the same shot and completes") {
+TEST_CASE(
+    "scanner cable cut while it computes: the cell holds, reconnects, gets the same shot and completes") {
   ScriptedRun cell;
   Once cut;
   bool held = false;
@@ -82,7 +89,8 @@ TEST_CASE("scanner cable cut while it computes: the cell holds, reconnects, gets
   CHECK(held);
   CHECK(run.exit_code == firmware_like::exit_done);
   check_truth(run.summary);
-  CHECK(cell.exposures == cell.shots().size());  // the scanner gave the stored frame: nothing was exposed twice
+  CHECK(cell.exposures ==
+        cell.shots().size());  // the scanner gave the stored frame: nothing was exposed twice
   CHECK(cell.repeats >= 1);
   CHECK(run.summary["shots"]["surface"] == 16);
 }
@@ -95,7 +103,8 @@ TEST_CASE(
     ScriptedRun cell;
     Once cut;
     const auto run = cell.run([&](const SimulatedCell& c, hal::Instant now) {
-      if (cut.begins(boundary_shots(c) == 4 && moves(c, now) && !computes(c, now), now)) c.scanner_cable.cut();
+      if (cut.begins(boundary_shots(c) == 4 && moves(c, now) && !computes(c, now), now))
+        c.scanner_cable.cut();
       if (cut.is_over(pause, now)) c.scanner_cable.mend();
     });
     CHECK(cut.happened());
@@ -105,7 +114,8 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("a scanner that goes while the arm calibrates is waited for, and missed by name when it stays away") {
+TEST_CASE(
+    "a scanner that goes while the arm calibrates is waited for, and missed by name when it stays away") {
   ScriptedRun comes_back, stays_away;
   const auto cut_at_once = [](ScriptedRun& cell, hal::Duration pause) {
     return cell.run([cut = Once{}, pause](const SimulatedCell& c, hal::Instant now) mutable {
@@ -134,7 +144,7 @@ TEST_CASE("scanner power cycle in mid-frame: the shot is taken again and the run
     check_truth(run.summary);
     CHECK(run.summary["shots"]["retaken"] == 1);
     CHECK(cell.exposures == cell.shots().size() + 1);  // the lost frame's
-    const hal::TemporaryFolder results;  // the replay must know that the shot was given up
+    const hal::TemporaryFolder results;                // the replay must know that the shot was given up
     CHECK(firmware_like::fit_run({.run = cell.folder(), .out = results.path()}) == firmware_like::exit_done);
     CHECK(text_of(results.file("surface.json")) == cell.file("surface.json"));
   }
@@ -226,11 +236,13 @@ TEST_CASE("a plate that leaves the workspace aborts before the arm does, and the
   const auto run = cell.run();
   CHECK(run.exit_code == firmware_like::exit_aborted);
   CHECK(says(run, "target outside the workspace: y "));
-  CHECK(says(run, "limit -800.0 to 50.0 mm: move the plate, or widen [robot.workspace] if the arm may go there"));
+  CHECK(says(run,
+             "limit -800.0 to 50.0 mm: move the plate, or widen [robot.workspace] if the arm may go there"));
   CHECK(cell.shots().size() >= 1);
 }
 
-TEST_CASE("a plate larger than the memory plan is held, everything saved, and the message says what to raise") {
+TEST_CASE(
+    "a plate larger than the memory plan is held, everything saved, and the message says what to raise") {
   for (const double width : {500.0, 900.0}) {
     CAPTURE(width);
     ScriptedRun cell;
