@@ -9,27 +9,6 @@ namespace moldloft::tasks {
 
 using hal::ShotPurpose;
 
-namespace {
-
-// Of the two yaws that look the same, the one at which the pose was commanded: what is planned next depends on it.
-ShotPlace place_commanded(const ShotPlace& wanted, const hal::Pose& commanded,
-                          const geometry::RigidMotion& tip_from_scanner) {
-  ShotPlace best = wanted;
-  double least = INFINITY;
-  for (const double half_turn : {0.0, std::numbers::pi}) {
-    ShotPlace place = wanted;
-    place.head_yaw = geometry::wrapped_angle(wanted.head_yaw + half_turn);
-    const auto motion = motion_of(tip_pose_for(place, tip_from_scanner));
-    const double distance = (motion.matrix() - motion_of(commanded).matrix()).norm();
-    if (distance >= least) continue;
-    least = distance;
-    best = place;
-  }
-  return best;
-}
-
-}  // namespace
-
 void Cell::want(const ShotPlace& place, ShotPurpose purpose) {
   Order order;
   order.number = ++last_number_;
@@ -208,7 +187,6 @@ bool Cell::deliver_archived() {
   wanted_.reset();
   exposed_.shot_id = shot->record.shot_id;
   exposed_.commanded = shot->record.commanded;
-  exposed_.place = place_commanded(exposed_.place, exposed_.commanded, settings_.tip_from_scanner);
   exposed_.reported = shot->record.reported;
   retaken_ += shot->record.attempts - 1;
   record("shot", "archived", "", "");

@@ -30,7 +30,7 @@ TEST_CASE("what is not known yet is not shown") {
   CHECK(progress_line({}) == "    0.0 s  Idle                      boundary shots   0");
 }
 
-TEST_CASE("what the cell waits for is shown; what ends the run is left to the run's last line") {
+TEST_CASE("what the cell waits for is shown, what ends the run is left to the run's last line") {
   CellProgress p{.state = CellState::held,
                  .phase = Phase::track_boundary,
                  .cause = HoldCause::scanner,

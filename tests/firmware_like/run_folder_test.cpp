@@ -88,7 +88,7 @@ TEST_CASE(
             "begin a new run with another --out");
 }
 
-TEST_CASE("what is resumed is appended to; what is opened to be read is not") {
+TEST_CASE("what is resumed is appended to, what is opened to be read is not") {
   const hal::TemporaryFolder folder;
   const std::string path = folder.file("run");
   REQUIRE(create_run(path, config, RunKind::measured).has_value());
