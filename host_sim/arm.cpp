@@ -1,5 +1,7 @@
 #include "host_sim/arm.hpp"
 
+#include "tasks/tool_pose.hpp"
+
 #include <cmath>
 #include <numbers>
 
@@ -15,20 +17,12 @@ std::expected<JointMotion, MotionError> plan_motion(const Arm& arm, const Joints
   return JointMotion(from, *joints, arm.limits(), speed_percent / 100.0);
 }
 
-geometry::RigidMotion motion_of(const hal::Pose& pose) {
-  geometry::RigidMotion motion = geometry::RigidMotion::Identity();
-  motion.linear() = geometry::rotation_from_zyz({pose.yaw, pose.pitch, pose.roll});
-  motion.translation() = Eigen::Vector3d{pose.x_mm, pose.y_mm, pose.z_mm};
-  return motion;
-}
-
-hal::Pose pose_of(const geometry::RigidMotion& motion) {
+hal::Pose read_back_pose(const geometry::RigidMotion& world_from_tip) {
   const auto rounded = [](double value, double step) { return std::round(value / step) * step; };
-  const auto angles = geometry::zyz_from_rotation(motion.linear());
-  const Eigen::Vector3d p = motion.translation();
   constexpr double mm = 0.001, angle = 0.001 * hal::degree;
-  return {rounded(p.x(), mm),         rounded(p.y(), mm),           rounded(p.z(), mm),
-          rounded(angles.yaw, angle), rounded(angles.pitch, angle), rounded(angles.roll, angle)};
+  const hal::Pose p = tasks::pose_of(world_from_tip);
+  return {rounded(p.x_mm, mm),   rounded(p.y_mm, mm),     rounded(p.z_mm, mm),
+          rounded(p.yaw, angle), rounded(p.pitch, angle), rounded(p.roll, angle)};
 }
 
 std::expected<double, MotionError> heading_of(const hal::Pose& pose) {

@@ -45,10 +45,9 @@ class Arm {
 std::expected<JointMotion, MotionError> plan_motion(const Arm&, const Joints& from, const hal::Pose& to,
                                                     double speed_percent);
 
-geometry::RigidMotion motion_of(const hal::Pose&);
-// Yaw 0, pitch 180 degrees, roll carries the turn (geometry::zyz_from_rotation); rounded to the wire's 0.001
-// mm and 0.001 degree, as encoders are read.
-hal::Pose pose_of(const geometry::RigidMotion&);
+// Where the tip is, as the controller reads it back: tasks::pose_of (a tool straight down has yaw 0, pitch 180
+// degrees, its turn in roll), rounded to the encoders' and the wire's 0.001 mm and 0.001 degree.
+hal::Pose read_back_pose(const geometry::RigidMotion& world_from_tip);
 
 // The turn of a tip that points straight down about world z: its x axis in plan. Fails for any other tip.
 std::expected<double, MotionError> heading_of(const hal::Pose&);

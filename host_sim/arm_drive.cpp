@@ -51,7 +51,7 @@ void ArmDrive::stop(hal::Instant now) {
 Joints ArmDrive::joints(hal::Instant now) const noexcept { return motion_.at(seconds(now - started_)); }
 
 hal::Pose ArmDrive::reported_pose(hal::Instant now) const {
-  return pose_of(arm_->world_from_tip(joints(now)));
+  return read_back_pose(arm_->world_from_tip(joints(now)));
 }
 
 geometry::RigidMotion ArmDrive::true_world_from_tip(hal::Instant now) const {

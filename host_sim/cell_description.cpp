@@ -80,7 +80,8 @@ std::unique_ptr<Arm> make_arm(const CellDescription& cell) {
 bool can_look(const Arm& arm, const Eigen::Vector3d& field_centre, double stripe_heading,
               const geometry::RigidMotion& tip_from_scanner) {
   const auto reachable = [&](double heading) {
-    return arm.joints_for(pose_of(world_from_tip_over(field_centre, heading, tip_from_scanner)), arm.home())
+    return arm
+        .joints_for(read_back_pose(world_from_tip_over(field_centre, heading, tip_from_scanner)), arm.home())
         .has_value();
   };
   return reachable(stripe_heading) || reachable(stripe_heading + std::numbers::pi);
@@ -117,7 +118,8 @@ std::expected<PlateInstance, SimError> placed_plate(const CellDescription& cell)
 
 hal::Pose start_pose(const CellDescription& cell) {
   const Eigen::Vector2d middle = middle_of(cell);
-  return pose_of(world_from_tip_over({middle.x(), middle.y(), field_over_table_mm}, 0.0, nominal_mount()));
+  return read_back_pose(
+      world_from_tip_over({middle.x(), middle.y(), field_over_table_mm}, 0.0, nominal_mount()));
 }
 
 }  // namespace moldloft::host_sim

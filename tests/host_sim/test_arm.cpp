@@ -6,6 +6,7 @@
 #include "host_sim/arm_drive.hpp"
 #include "host_sim/gantry_arm.hpp"
 #include "host_sim/scara_arm.hpp"
+#include "tasks/tool_pose.hpp"
 
 using namespace moldloft;
 using namespace moldloft::host_sim;
@@ -18,7 +19,7 @@ hal::Pose down_at(double x, double y, double z, double roll_degrees) {
 }
 
 double distance(const hal::Pose& a, const hal::Pose& b) {
-  return (motion_of(a).matrix() - motion_of(b).matrix()).cwiseAbs().maxCoeff();
+  return (tasks::motion_of(a).matrix() - tasks::motion_of(b).matrix()).cwiseAbs().maxCoeff();
 }
 
 constexpr ArmErrors no_errors{0, 0, 0, 0};
@@ -35,8 +36,9 @@ TEST_CASE("SCARA joints and poses go round trip over the whole workspace") {
         const auto joints = arm->joints_for(pose, arm->home());
         if (!joints) continue;
         ++reached;
-        CHECK((arm->world_from_tip(*joints).matrix() - motion_of(pose).matrix()).cwiseAbs().maxCoeff() <
-              1e-9);
+        CHECK(
+            (arm->world_from_tip(*joints).matrix() - tasks::motion_of(pose).matrix()).cwiseAbs().maxCoeff() <
+            1e-9);
         CHECK((*joints)[1] > 0);  // it never changes the side of its elbow
       }
     }
@@ -149,7 +151,7 @@ TEST_CASE("a link that is longer than believed shows in the true pose only") {
   REQUIRE(drive.start(target, 100, 0ns).has_value());
   const auto now = drive.settled_at();
   CHECK(distance(drive.reported_pose(now), target) < 1e-3);
-  CHECK((drive.true_world_from_tip(now).translation() - motion_of(target).translation()).norm() ==
+  CHECK((drive.true_world_from_tip(now).translation() - tasks::motion_of(target).translation()).norm() ==
         doctest::Approx(0.5));
 }
 
@@ -158,7 +160,8 @@ TEST_CASE("the gantry reaches its volume and no more") {
   const auto pose = down_at(2900, 100, 350, 45);
   const auto joints = arm->joints_for(pose, arm->home());
   REQUIRE(joints.has_value());
-  CHECK((arm->world_from_tip(*joints).matrix() - motion_of(pose).matrix()).cwiseAbs().maxCoeff() < 1e-9);
+  CHECK((arm->world_from_tip(*joints).matrix() - tasks::motion_of(pose).matrix()).cwiseAbs().maxCoeff() <
+        1e-9);
   CHECK(arm->joints_for(down_at(3001, 100, 350, 45), arm->home()).error().text.view() ==
         "x axis would stand at 3001.0 mm, its limits are 0.0 and 3000.0");
 }

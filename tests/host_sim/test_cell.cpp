@@ -6,6 +6,7 @@
 #include "hal/cable.hpp"
 #include "host_sim/plan_polygon.hpp"
 #include "host_sim/world.hpp"
+#include "tasks/tool_pose.hpp"
 
 using namespace moldloft;
 using namespace moldloft::host_sim;
@@ -39,7 +40,7 @@ TEST_CASE("every plate with every outline finds a place by seed, and the start l
 
 TEST_CASE("the start pose brings the field of view over the middle of the cell") {
   const CellDescription cell;
-  const auto at = motion_of(start_pose(cell)) * nominal_mount();
+  const auto at = tasks::motion_of(start_pose(cell)) * nominal_mount();
   CHECK(at.translation().x() == doctest::Approx(510));
   CHECK(std::abs(at.translation().y()) < 1e-3);
   CHECK(at.translation().z() == doctest::Approx(15));
