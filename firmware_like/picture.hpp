@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "geometry/bspline.hpp"
-#include "geometry/outline.hpp"
+#include "geometry/splines/bspline.hpp"
+#include "geometry/edges/outline.hpp"
 #include "tasks/boundary_tracker.hpp"
 
 namespace moldloft::firmware_like {

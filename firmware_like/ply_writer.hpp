@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "firmware_like/measured_points.hpp"
-#include "geometry/bspline.hpp"
+#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::firmware_like {
 

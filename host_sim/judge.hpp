@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "geometry/bspline.hpp"
+#include "geometry/splines/bspline.hpp"
 #include "host_sim/cell_description.hpp"
 
 namespace moldloft::host_sim {

@@ -19,7 +19,7 @@
 #include <string_view>
 #include <vector>
 
-#include "geometry/boundary_view.hpp"
+#include "geometry/edges/boundary_view.hpp"
 #include "geometry/rigid_motion.hpp"
 #include "hal/fixed_text.hpp"
 #include "tasks/transition.hpp"

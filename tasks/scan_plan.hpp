@@ -11,7 +11,7 @@
 #include <span>
 
 #include "geometry/error.hpp"
-#include "geometry/outline.hpp"
+#include "geometry/edges/outline.hpp"
 #include "tasks/boundary_tracker.hpp"
 #include "tasks/height_model.hpp"
 

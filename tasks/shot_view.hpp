@@ -9,8 +9,8 @@
 #include <optional>
 #include <vector>
 
-#include "geometry/boundary_view.hpp"
-#include "geometry/plate_runs.hpp"
+#include "geometry/edges/boundary_view.hpp"
+#include "geometry/edges/plate_runs.hpp"
 #include "hal/frame.hpp"
 
 namespace moldloft::tasks {

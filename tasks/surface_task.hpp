@@ -17,11 +17,11 @@
 #include <span>
 #include <vector>
 
-#include "geometry/corner_choice.hpp"
-#include "geometry/outline.hpp"
-#include "geometry/plan_map.hpp"
+#include "geometry/edges/corner_choice.hpp"
+#include "geometry/edges/outline.hpp"
+#include "geometry/fit/plan_map.hpp"
 #include "geometry/rigid_motion.hpp"
-#include "geometry/surface_fit.hpp"
+#include "geometry/fit/surface_fit.hpp"
 #include "tasks/scheduler.hpp"
 #include "tasks/shot_view.hpp"
 

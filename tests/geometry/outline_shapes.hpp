@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "geometry/outline.hpp"
+#include "geometry/edges/outline.hpp"
 
 namespace moldloft::test {
 

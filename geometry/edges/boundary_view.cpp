@@ -1,0 +1,387 @@
+#include "geometry/edges/boundary_view.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+
+#include "geometry/edges/edge_lines.hpp"
+
+namespace moldloft::geometry {
+
+namespace {
+
+constexpr double tangent_stretch_mm = 30;   // long enough for 0.1 degrees, short against the bend of a side
+constexpr std::size_t bridged_stripes = 2;  // stripes without an edge point that do not cut a piece
+constexpr double shortest_run_mm =
+    3.5;  // a tip's last stripes are too short to count as runs (plate_runs.hpp)
+constexpr std::size_t max_corners = 8;  // of one piece; a plate has four
+
+double turn_between(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b));
+}
+
+}  // namespace
+
+struct BoundaryViewer::Ends {
+  std::uint16_t stripe;
+  bool low_is_edge, high_is_edge;
+  bool low_is_covered, high_is_covered;  // RunEnd::hidden: something lies over the edge
+  Eigen::Vector3d low, high;
+};
+
+struct BoundaryViewer::Break {
+  std::size_t before;  // the ring's point after the break
+  // The boundary goes on between stripes, rather than out of the field: after the piece that ends here,
+  // before the one that starts here.
+  bool ends_hidden, starts_hidden;
+};
+
+BoundaryViewer::BoundaryViewer(std::size_t max_runs) {
+  ends_.reserve(max_runs);
+  ring_.reserve(2 * max_runs);
+  points_.reserve(2 * max_runs);
+  breaks_.reserve(2 * max_runs + 4);
+  pieces_.reserve(2 * max_runs + 4);
+}
+
+BoundaryViewer::~BoundaryViewer() = default;
+BoundaryViewer::BoundaryViewer(BoundaryViewer&&) noexcept = default;
+
+std::size_t BoundaryViewer::bytes() const {
+  return ends_.capacity() * sizeof(Ends) + (ring_.capacity() + points_.capacity()) * sizeof(EdgePoint) +
+         breaks_.capacity() * sizeof(Break) + pieces_.capacity() * sizeof(BoundaryPiece);
+}
+
+// The outer boundary takes every stripe's lowest and highest end; what lies between them are holes and glare.
+void BoundaryViewer::collect_ends(std::span<const PlateRun> runs) {
+  ends_.clear();
+  for (const PlateRun& run : runs) {
+    if (ends_.empty() || ends_.back().stripe != run.stripe) {
+      if (ends_.size() == ends_.capacity()) return;
+      ends_.push_back({.stripe = run.stripe,
+                       .low_is_edge = is_edge(run.at_first),
+                       .high_is_edge = false,
+                       .low_is_covered = run.at_first == RunEnd::hidden,
+                       .high_is_covered = false,
+                       .low = run.edge_first,
+                       .high = run.edge_last});
+    }
+    Ends& ends = ends_.back();
+    ends.high = run.edge_last;
+    ends.high_is_edge = is_edge(run.at_last);
+    ends.high_is_covered = run.at_last == RunEnd::hidden;
+  }
+}
+
+namespace {
+
+enum class Cap { out_of_field, closes, hidden };
+
+}  // namespace
+
+// Walks once round the region, counter-clockwise, collecting edge points and the breaks between them.
+void BoundaryViewer::walk_ring(View& view, std::size_t stripe_count, const BoundaryViewSettings& settings) {
+  ring_.clear(), breaks_.clear();
+  const std::size_t n = ends_.size();
+  const auto add_break = [&](bool hidden) {
+    if (!breaks_.empty() && breaks_.back().before == ring_.size()) {
+      breaks_.back().starts_hidden = hidden;
+    } else if (breaks_.size() < breaks_.capacity()) {
+      breaks_.push_back({ring_.size(), hidden, hidden});
+    }
+  };
+  // A region that ends inside the field with stripe `at` closes there if its stripes get shorter fast enough
+  // to vanish before the next one; `inner` are the stripes that come before it.
+  const auto cap = [&](std::size_t at, std::ptrdiff_t inner, bool outermost) {
+    const double x = ends_[at].low.x();
+    const bool beside_field = std::abs(x) >= settings.field_half_x_mm - settings.field_margin_mm;
+    if (outermost || beside_field) return Cap::out_of_field;
+    const auto length = [&](std::size_t k) { return ends_[k].high.y() - ends_[k].low.y(); };
+    double shrinks = 0;
+    const auto before = [&](std::ptrdiff_t steps) { return static_cast<std::ptrdiff_t>(at) + steps * inner; };
+    for (std::ptrdiff_t steps : {1, 3}) {
+      if (before(steps) < 0 || before(steps) >= static_cast<std::ptrdiff_t>(n)) break;
+      shrinks = std::max(shrinks, (length(before(steps)) - length(at)) / static_cast<double>(steps));
+    }
+    return length(at) <= 1.5 * shrinks + shortest_run_mm ? Cap::closes : Cap::hidden;
+  };
+  const auto add_end = [&](std::size_t k, bool low, std::size_t& missing) {
+    const bool edge = low ? ends_[k].low_is_edge : ends_[k].high_is_edge;
+    const bool covered = low ? ends_[k].low_is_covered : ends_[k].high_is_covered;
+    if (edge) {
+      ring_.push_back({low ? ends_[k].low : ends_[k].high, ends_[k].stripe});
+      missing = 0;
+    } else if (!covered || ++missing > bridged_stripes) {
+      add_break(false);
+    }
+  };
+  const auto add_cap = [&](std::size_t at, Cap kind, std::optional<double>& hidden_x, double outward) {
+    const bool any_edge = ends_[at].low_is_edge || ends_[at].high_is_edge;
+    if (kind == Cap::hidden) hidden_x = ends_[at].low.x() + 0.5 * outward * settings.stripe_pitch_mm;
+    if (kind == Cap::hidden && any_edge) add_break(true);
+    if (kind == Cap::out_of_field) add_break(false);
+  };
+
+  std::size_t missing = 0;
+  for (std::size_t k = 0; k < n; ++k) add_end(k, true, missing);
+  const bool last_outermost = ends_.back().stripe + 1u == stripe_count;
+  add_cap(n - 1, cap(n - 1, -1, last_outermost), view.hidden_high_x_mm, 1);
+  missing = 0;
+  for (std::size_t k = n; k-- > 0;) add_end(k, false, missing);
+  add_cap(0, cap(0, 1, ends_.front().stripe == 0), view.hidden_low_x_mm, -1);
+}
+
+// Cuts the ring at its breaks, starting behind the first so that no piece crosses the start of the walk.
+void BoundaryViewer::split_into_pieces(const BoundaryViewSettings& settings) {
+  const std::size_t n = ring_.size();
+  points_.clear(), pieces_.clear();
+  if (n == 0) return;
+  // A break after the last point is one before the first.
+  if (!breaks_.empty() && breaks_.back().before == n) {
+    const Break last = breaks_.back();
+    breaks_.pop_back();
+    if (!breaks_.empty() && breaks_.front().before == 0) {
+      breaks_.front().ends_hidden = last.ends_hidden;
+    } else {
+      breaks_.insert(breaks_.begin(), {0, last.ends_hidden, last.starts_hidden});
+    }
+  }
+  // A ring without a break, a plate smaller than the field, is opened in the middle of its lower side.
+  if (breaks_.empty()) breaks_.push_back({n / 4, false, false});
+  const std::size_t start = breaks_.front().before;
+  std::rotate_copy(ring_.begin(), ring_.begin() + start, ring_.end(), std::back_inserter(points_));
+  ring_.swap(points_);  // the ring keeps all points in order, points_ takes those that are believed
+  points_.clear();
+  for (std::size_t b = 0; b < breaks_.size(); ++b) {
+    const Break& next = breaks_[(b + 1) % breaks_.size()];
+    const std::size_t from = breaks_[b].before - start;
+    const std::size_t to = b + 1 < breaks_.size() ? next.before - start : n;
+    const std::size_t begin = points_.size();
+    std::copy(ring_.begin() + from, ring_.begin() + to, std::back_inserter(points_));
+    std::size_t end = points_.size();
+    drop_false_points(begin, end);
+    points_.resize(end);
+    describe(begin, end, breaks_[b].starts_hidden, next.ends_hidden, settings);
+  }
+}
+
+void BoundaryViewer::drop_false_points(std::size_t begin, std::size_t& end) {
+  // Twice, since one false point beside another can hide it. Judged against the unchanged piece, dropped
+  // afterwards.
+  for (int pass = 0; pass < 2; ++pass) {
+    const auto piece = std::span<const EdgePoint>(points_).subspan(begin, end - begin);
+    std::size_t kept = begin;
+    constexpr std::size_t lag = 6;  // a point may be overwritten once no later point is judged by it
+    std::array<bool, lag> verdicts{};
+    for (std::size_t i = 0; i < piece.size() + lag; ++i) {
+      if (i >= lag) {
+        const std::size_t settled = i - lag;
+        const bool keep = !verdicts[settled % lag];
+        if (keep) points_[kept++] = points_[begin + settled];
+      }
+      if (i < piece.size()) verdicts[i % lag] = is_false_point(piece, i);
+    }
+    end = kept;
+  }
+}
+
+namespace {
+
+bool well_inside(const Eigen::Vector2d& p, const BoundaryViewSettings& settings) {
+  const double reach = settings.field_margin_mm + 6;
+  return std::abs(p.x()) < settings.field_half_x_mm - reach &&
+         std::abs(p.y()) < settings.field_half_y_mm - reach;
+}
+
+// True when the few points that end with `last` do not simply leave the field, or lie so far apart that the
+// side runs almost along the stripes: the scanner sees more of it when it is turned.
+bool stub_hides(const EdgePoint& last, const EdgePoint& before, const BoundaryViewSettings& settings) {
+  const bool steep = (last.position - before.position).head<2>().norm() > 4 * settings.stripe_pitch_mm;
+  return steep || well_inside(last.position.head<2>(), settings);
+}
+
+// True when a piece stops although its direction would take it to the next stripe, and the one after, well
+// inside the field: its boundary turned away unseen, between stripes.
+bool vanishes(std::span<const EdgePoint> part, bool at_last, const BoundaryViewSettings& settings) {
+  if (part.size() < settings.min_side_points) return false;
+  const auto stretch = at_last ? last_stretch(part, tangent_stretch_mm, settings.min_side_points)
+                               : first_stretch(part, tangent_stretch_mm, settings.min_side_points);
+  const Eigen::Vector2d direction = fit_edge_line(stretch).direction * (at_last ? 1.0 : -1.0);
+  const Eigen::Vector2d end = (at_last ? part.back() : part.front()).position.head<2>();
+  const double to_next_stripe = settings.stripe_pitch_mm / std::max(std::abs(direction.x()), 1e-3);
+  return well_inside(end, settings) && well_inside(end + 2 * to_next_stripe * direction, settings);
+}
+
+}  // namespace
+
+namespace {
+
+// Where the points of `part` want two lines rather than one, and those make a corner with at least `least`
+// points on either side: the first point beyond it. 0 where there is none.
+std::size_t corner_within(std::span<const EdgePoint> part, std::size_t least,
+                          const BoundaryViewSettings& settings) {
+  const std::size_t min_side = settings.min_side_points;
+  if (part.size() < min_side + least) return 0;
+  const EdgeLine one = fit_edge_line(part);
+  double squares = 0, largest = 0;
+  for (const EdgePoint& p : part) {
+    const double r = one.distance(p.position.head<2>());
+    squares += r * r, largest = std::max(largest, std::abs(r));
+  }
+  const double rms = std::sqrt(squares / static_cast<double>(part.size()));
+  if (rms <= settings.max_line_rms_mm && largest <= 4 * settings.max_line_rms_mm) return 0;
+  // Two lines may split a piece with two corners between them; the point farthest from the chord is then near
+  // one. Both searches may leave a side with two points: forced to more, they would borrow them from the
+  // other side.
+  for (const std::size_t split : {best_split(part, 2), split_at_farthest(part, tangent_stretch_mm, 2)}) {
+    if (split < least || part.size() - split < least) continue;
+    const EdgeLine a = fit_edge_line(last_stretch(part.first(split), tangent_stretch_mm, min_side));
+    const EdgeLine b = fit_edge_line(first_stretch(part.subspan(split), tangent_stretch_mm, min_side));
+    if (std::abs(turn_between(a.direction, b.direction)) >= settings.min_corner_turn) return split;
+  }
+  return 0;
+}
+
+// A piece's begin, its corners, its end.
+struct Cuts {
+  std::array<std::size_t, max_corners + 2> at{};
+  std::size_t count = 2;
+};
+
+Cuts find_corners(std::span<const EdgePoint> all, std::size_t begin, std::size_t end,
+                  const BoundaryViewSettings& settings) {
+  Cuts cuts{.at = {begin, end}};
+  auto& at = cuts.at;
+  for (std::size_t k = 0; k + 1 < cuts.count && cuts.count < at.size();) {
+    const std::size_t split =
+        corner_within(all.subspan(at[k], at[k + 1] - at[k]), settings.min_side_points, settings);
+    if (split == 0) {
+      ++k;
+      continue;
+    }
+    std::copy_backward(at.begin() + k + 1, at.begin() + cuts.count, at.begin() + cuts.count + 1);
+    at[k + 1] = at[k] + split;
+    ++cuts.count;
+  }
+  // The first splits were found before the others were known: place each again between its neighbours, then
+  // ask once more whether it is a corner.
+  for (int pass = 0; pass < 2; ++pass) {
+    for (std::size_t k = 1; k + 1 < cuts.count;) {
+      const auto between = all.subspan(at[k - 1], at[k + 1] - at[k - 1]);
+      const std::size_t split = corner_within(between, settings.min_side_points, settings);
+      if (split != 0) {
+        at[k] = at[k - 1] + split;
+        ++k;
+      } else {
+        std::copy(at.begin() + k + 1, at.begin() + cuts.count, at.begin() + k);
+        --cuts.count;
+      }
+    }
+  }
+  return cuts;
+}
+
+// A stub of two or three points beyond a corner has no tangent: the side ends at the corner, and unless the
+// stub leads out of the field, the rest of the boundary hides between stripes. Says whether it hides at the
+// last, or first, end.
+bool trim_last(std::span<const EdgePoint> all, Cuts& cuts, const BoundaryViewSettings& settings) {
+  const std::size_t from = cuts.at[cuts.count - 2], end = cuts.at[cuts.count - 1];
+  const std::size_t split = corner_within(all.subspan(from, end - from), 2, settings);
+  if (split == 0 || end - from - split >= settings.min_side_points) {
+    return vanishes(all.subspan(cuts.at[0], end - cuts.at[0]), true, settings);
+  }
+  cuts.at[cuts.count - 1] = from + split;
+  return stub_hides(all[end - 1], all[end - 2], settings);
+}
+
+bool trim_first(std::span<const EdgePoint> all, Cuts& cuts, const BoundaryViewSettings& settings) {
+  const std::size_t begin = cuts.at[0], to = cuts.at[1];
+  const std::size_t split = corner_within(all.subspan(begin, to - begin), 2, settings);
+  if (split == 0 || split >= settings.min_side_points) {
+    return vanishes(all.subspan(begin, cuts.at[cuts.count - 1] - begin), false, settings);
+  }
+  cuts.at[0] = begin + split;
+  return stub_hides(all[begin], all[begin + 1], settings);
+}
+
+}  // namespace
+
+// Finds the corners of one piece, cuts it half-way between them, and describes every part.
+void BoundaryViewer::describe(std::size_t begin, std::size_t end, bool hidden_first, bool hidden_last,
+                              const BoundaryViewSettings& settings) {
+  if (end - begin < settings.min_side_points) return;
+  const std::span<const EdgePoint> all(points_);
+  Cuts cuts = find_corners(all, begin, end, settings);
+  hidden_last |= trim_last(all, cuts, settings);
+  hidden_first |= trim_first(all, cuts, settings);
+
+  BoundaryPiece piece;
+  piece.hidden_first = hidden_first, piece.hidden_last = hidden_last;
+  const std::size_t count = cuts.count;
+  if (count == 2) return describe_side(cuts.at[0], cuts.at[1], piece, settings);
+  for (std::size_t k = 1; k + 1 < count; ++k) {
+    const std::size_t from = k == 1 ? cuts.at[0] : (cuts.at[k - 1] + cuts.at[k]) / 2;
+    const std::size_t to = k + 2 == count ? cuts.at[count - 1] : (cuts.at[k] + cuts.at[k + 1]) / 2;
+    piece.hidden_first = k == 1 && hidden_first;
+    piece.hidden_last = k + 2 == count && hidden_last;
+    describe_corner(from, cuts.at[k], to, piece, settings);
+  }
+}
+
+void BoundaryViewer::describe_side(std::size_t begin, std::size_t end, BoundaryPiece piece,
+                                   const BoundaryViewSettings& settings) {
+  const std::size_t min_side = settings.min_side_points;
+  const auto part = std::span<const EdgePoint>(points_).subspan(begin, end - begin);
+  if (part.size() < min_side || pieces_.size() == pieces_.capacity()) return;
+  piece.first = static_cast<std::uint32_t>(begin), piece.count = static_cast<std::uint32_t>(end - begin);
+  piece.tangent_first = fit_edge_line(first_stretch(part, tangent_stretch_mm, min_side)).direction;
+  piece.tangent_last = fit_edge_line(last_stretch(part, tangent_stretch_mm, min_side)).direction;
+  piece.turn = turn_between(piece.tangent_first, piece.tangent_last);
+  piece.rms_mm = fit_edge_line(part).rms_mm;
+  pieces_.push_back(piece);
+}
+
+void BoundaryViewer::describe_corner(std::size_t begin, std::size_t split, std::size_t end,
+                                     BoundaryPiece piece, const BoundaryViewSettings& settings) {
+  const std::span<const EdgePoint> all(points_);
+  const auto before = all.subspan(begin, split - begin), after = all.subspan(split, end - split);
+  const std::size_t min_side = settings.min_side_points;
+  const EdgeLine in = fit_edge_line(last_stretch(before, tangent_stretch_mm, min_side));
+  const EdgeLine out = fit_edge_line(first_stretch(after, tangent_stretch_mm, min_side));
+  piece.kind = BoundaryPiece::Kind::corner;
+  piece.first = static_cast<std::uint32_t>(begin), piece.count = static_cast<std::uint32_t>(end - begin);
+  piece.points_before = static_cast<std::uint32_t>(split - begin);
+  piece.tangent_first = fit_edge_line(first_stretch(before, tangent_stretch_mm, min_side)).direction;
+  piece.tangent_last = fit_edge_line(last_stretch(after, tangent_stretch_mm, min_side)).direction;
+  piece.turn = turn_between(piece.tangent_first, piece.tangent_last);
+  piece.corner = meeting_point(in, out).value_or(all[split].position.head<2>());
+  const double nb = static_cast<double>(before.size()), na = static_cast<double>(after.size());
+  const double rb = fit_edge_line(before).rms_mm, ra = fit_edge_line(after).rms_mm;
+  piece.rms_mm = std::sqrt((nb * rb * rb + na * ra * ra) / (nb + na));
+  if (pieces_.size() < pieces_.capacity()) pieces_.push_back(piece);
+}
+
+BoundaryViewer::View BoundaryViewer::look(std::span<const PlateRun> runs, std::size_t stripe_count,
+                                          const BoundaryViewSettings& settings) {
+  View view;
+  collect_ends(runs);
+  points_.clear(), pieces_.clear();
+  if (ends_.empty()) return view;
+  walk_ring(view, stripe_count, settings);
+  split_into_pieces(settings);
+
+  const auto length = [&](const BoundaryPiece& piece) {
+    return (points_[piece.first + piece.count - 1].position - points_[piece.first].position).head<2>().norm();
+  };
+  std::sort(pieces_.begin(), pieces_.end(),
+            [&](const BoundaryPiece& a, const BoundaryPiece& b) { return length(a) > length(b); });
+  view.points = points_;
+  view.pieces = pieces_;
+  // Stripes may be missing here and there; a plate that ends inside the field leaves the outer ones empty.
+  const bool reaches_sides = !view.hidden_low_x_mm && !view.hidden_high_x_mm;
+  view.plate_fills_field = ring_.empty() && reaches_sides && ends_.size() * 10 >= stripe_count * 9;
+  return view;
+}
+
+}  // namespace moldloft::geometry

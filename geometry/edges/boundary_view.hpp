@@ -1,0 +1,89 @@
+// What one shot shows of the plate's boundary: its edge points in order, counter-clockwise about the plate
+// (the plate on the left), cut into pieces where the boundary runs out of the field, and what each piece is:
+// a side or a corner.
+//
+// A region's boundary goes along the lower ends of its runs with the stripes ascending and back along the upper ends.
+// Where the region begins or ends with a stripe inside the field, the boundary lies hidden between two parallel
+// stripes (thesis section 5.3.2); the piece is then marked as hidden there and the scanner has to be turned.
+//
+// Frame        as the edge points are given: scanner coordinates, plan view decides
+// Cost         O(edge points), plus a split search of O(n log n) for corners
+// Allocation   in the constructor only
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "geometry/edges/plate_runs.hpp"
+
+namespace moldloft::geometry {
+
+struct EdgePoint {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  std::uint16_t stripe = 0;
+};
+
+struct BoundaryPiece {
+  enum class Kind { side, corner };
+  std::uint32_t first = 0, count = 0;  // its points in BoundaryView::points, counter-clockwise
+  Kind kind = Kind::side;
+  // Direction of travel (unit, plan view) at both ends, from robust local lines.
+  Eigen::Vector2d tangent_first = Eigen::Vector2d::Zero(), tangent_last = Eigen::Vector2d::Zero();
+  double turn = 0;  // rad from tangent_first to tangent_last; positive is a convex corner
+  // Kind::corner: where the lines of both sides meet, extrapolated if need be.
+  Eigen::Vector2d corner = Eigen::Vector2d::Zero();
+  std::uint32_t points_before = 0;  // Kind::corner: points on the first side, the rest lie on the second
+  bool hidden_first = false, hidden_last = false;  // the boundary goes on unseen between stripes at this end
+  double rms_mm = 0;                               // residual about the one line or the two
+};
+
+struct BoundaryViewSettings {
+  double min_corner_turn = 0.26;      // rad (15 degrees): less is a side that bends
+  double max_line_rms_mm = 0.25;      // a side straighter than this needs no corner
+  std::uint32_t min_side_points = 4;  // fewer points on a side of a corner do not give it a tangent
+  double stripe_pitch_mm = 1.03;      // for telling a hidden boundary from a step to the next stripe
+  double field_half_x_mm = 51.0, field_half_y_mm = 51.0, field_margin_mm = 1.0;
+};
+
+class BoundaryViewer {
+ public:
+  explicit BoundaryViewer(std::size_t max_runs);
+  ~BoundaryViewer();
+  BoundaryViewer(BoundaryViewer&&) noexcept;
+
+  struct View {
+    std::span<const EdgePoint> points;
+    std::span<const BoundaryPiece> pieces;  // longest first; empty when no edge is in the field
+    bool plate_fills_field = false;  // no edge at all, and every stripe lies on the plate from end to end
+    // Where the region ends inside the field with a long stripe, the boundary runs unseen between this x and the next
+    // stripe: the plate ends within half a pitch of the value, seen even where no stripe shows an edge point.
+    std::optional<double> hidden_low_x_mm, hidden_high_x_mm;
+  };
+  View look(std::span<const PlateRun> runs, std::size_t stripe_count,
+            const BoundaryViewSettings&);  // valid until the next call
+
+  std::size_t bytes() const;
+
+ private:
+  struct Ends;   // one stripe's lower and upper end
+  struct Break;  // a place in the ring of edge points where the boundary leaves the field or hides
+
+  void collect_ends(std::span<const PlateRun> runs);
+  void walk_ring(View&, std::size_t stripe_count, const BoundaryViewSettings&);
+  void split_into_pieces(const BoundaryViewSettings&);
+  void drop_false_points(std::size_t begin, std::size_t& end);
+  void describe(std::size_t begin, std::size_t end, bool hidden_first, bool hidden_last,
+                const BoundaryViewSettings&);
+  void describe_side(std::size_t begin, std::size_t end, BoundaryPiece, const BoundaryViewSettings&);
+  void describe_corner(std::size_t begin, std::size_t split, std::size_t end, BoundaryPiece,
+                       const BoundaryViewSettings&);
+
+  std::vector<Ends> ends_;
+  std::vector<EdgePoint> ring_, points_;
+  std::vector<Break> breaks_;
+  std::vector<BoundaryPiece> pieces_;
+};
+
+}  // namespace moldloft::geometry

@@ -1,0 +1,429 @@
+#include "geometry/edges/plate_runs.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+#include "geometry/edges/stripe_line.hpp"
+
+namespace moldloft::geometry {
+
+namespace {
+
+// A height that differs from the line so far by more than this many standard deviations does not continue it:
+// with 50,000 points a frame, 5.5 lets one good point in a thousand frames go, and a point on the plate's
+// side wall has to lie within 0.3 mm of the top to be taken for the plate.
+constexpr double jump_sigmas = 5.5;
+constexpr double trim_sigmas =
+    4.0;  // the last points of a run are looked at once more, against the points inside
+
+constexpr double start_slope =
+    0.6;  // tan 31 degrees: what a line may turn out to be while its slope is unknown
+constexpr double slope_doubt = 0.1;     // five standard deviations of a slope over the filter's memory
+constexpr double curvature = 1.0 / 50;  // 1/mm, sharper than any bend that a gap may hide
+constexpr std::size_t outliers_in_a_row = 2;
+constexpr std::size_t line_points = 12;  // for lines at the ends of runs, as long as the filter's memory
+constexpr std::size_t trim_points = 3;   // as many points as a side wall leaves beyond an edge
+
+// Runs a stripe may hold on average: a field of 102 mm holds 34 of the shortest.
+constexpr std::size_t runs_per_stripe = 40;
+constexpr std::size_t fewest_points = 4;  // of a piece: fewer have no slope
+
+bool is_good(const StripeView& stripe, std::size_t i) {
+  return std::isfinite(stripe.z[i]) && std::isfinite(stripe.y[i]) && std::isfinite(stripe.x[i]);
+}
+
+// The stripe's usual distance between neighbouring points, from a sample of them; missing points do not
+// count.
+double usual_spacing(const StripeView& stripe) {
+  std::array<double, 31> sample;
+  std::size_t count = 0;
+  const std::size_t stride = std::max<std::size_t>(1, stripe.y.size() / sample.size());
+  for (std::size_t i = 1; i < stripe.y.size() && count < sample.size(); i += stride) {
+    const double dy = stripe.y[i] - stripe.y[i - 1];
+    if (std::isfinite(dy) && dy > 0) sample[count++] = dy;
+  }
+  if (count == 0) return 0.2;
+  std::nth_element(sample.begin(), sample.begin() + count / 2, sample.begin() + count);
+  return sample[count / 2];
+}
+
+// The same near one end of a run, where perspective may have stretched it.
+double spacing_near_end(const StripeView& stripe, std::span<const std::uint32_t> good, bool at_last) {
+  std::array<double, 21> sample;
+  std::size_t count = 0;
+  const std::size_t n = std::min(good.size(), sample.size() + 1);
+  const auto end = at_last ? good.last(n) : good.first(n);
+  for (std::size_t k = 1; k < n; ++k) {
+    const double steps = end[k] - end[k - 1];
+    sample[count++] = (stripe.y[end[k]] - stripe.y[end[k - 1]]) / steps;
+  }
+  if (count == 0) return 0;
+  std::nth_element(sample.begin(), sample.begin() + count / 2, sample.begin() + count);
+  return sample[count / 2];
+}
+
+double allowed_jump(const PlateRunSettings& settings, double dy, bool slope_known) {
+  const double noise = std::max(jump_sigmas * settings.noise_mm, 0.1 * settings.min_step_mm);
+  return noise + (slope_known ? slope_doubt : start_slope) * dy + 0.5 * curvature * dy * dy;
+}
+
+}  // namespace
+
+struct PlateRunFinder::Piece {
+  std::uint32_t begin, count;  // in good_
+};
+
+struct PlateRunFinder::Run {
+  std::uint32_t begin, count;  // in good_
+  std::uint32_t parent;        // union-find over runs
+  std::uint16_t stripe;
+  bool linked_forward;
+  double y_first, y_last;
+};
+
+PlateRunFinder::PlateRunFinder(std::size_t max_stripes, std::size_t max_points)
+    : max_stripes_(max_stripes), max_points_(max_points) {
+  good_.reserve(max_points);
+  pieces_.reserve(max_points / fewest_points + 1);
+  runs_.reserve(max_stripes * runs_per_stripe);
+  found_.reserve(max_stripes * runs_per_stripe);
+  first_run_.reserve(max_stripes + 1);
+}
+
+PlateRunFinder::~PlateRunFinder() = default;
+PlateRunFinder::PlateRunFinder(PlateRunFinder&&) noexcept = default;
+
+std::size_t PlateRunFinder::bytes() const {
+  return good_.capacity() * sizeof(good_[0]) + pieces_.capacity() * sizeof(Piece) +
+         runs_.capacity() * sizeof(Run) + found_.capacity() * sizeof(PlateRun) +
+         first_run_.capacity() * sizeof(first_run_[0]);
+}
+
+// Walks along one stripe and cuts it where the height leaves the line so far. One or two points that leave it
+// and come back are outliers and skipped.
+void PlateRunFinder::cut_stripe(const StripeView& stripe, const PlateRunSettings& settings) {
+  const double spacing = usual_spacing(stripe);
+  const std::size_t size = stripe.z.size();
+  HeightFilter filter;
+  double y_before = 0;
+
+  const auto fits = [&](std::size_t i) {
+    const double dy = std::max(0.0, stripe.y[i] - y_before);
+    return std::abs(stripe.z[i] - filter.predict(stripe.y[i])) <=
+           allowed_jump(settings, dy, filter.count() >= 6);
+  };
+  const auto next_good = [&](std::size_t i) {
+    for (++i; i < size && !is_good(stripe, i);) ++i;
+    return i;
+  };
+  const auto take = [&](std::size_t i) {
+    good_.push_back(static_cast<std::uint32_t>(i));
+    ++pieces_.back().count;
+    y_before = stripe.y[i];
+  };
+  const auto start = [&](std::size_t i) {
+    if (!pieces_.empty() && pieces_.back().count < fewest_points) {
+      good_.resize(pieces_.back().begin);
+      pieces_.pop_back();
+    }
+    pieces_.push_back({static_cast<std::uint32_t>(good_.size()), 0});
+    filter.restart(stripe.y[i], stripe.z[i]);
+    take(i);
+  };
+
+  std::size_t i = is_good(stripe, 0) ? 0 : next_good(0);
+  if (i < size) start(i);
+  while ((i = next_good(i)) < size) {
+    if (stripe.y[i] - y_before > settings.bridge_mm) {
+      start(i);
+    } else if (fits(i)) {
+      filter.update(stripe.y[i], stripe.z[i], spacing);
+      take(i);
+    } else {
+      // The line is taken up again if the point after the outliers fits, and the one after that confirms it.
+      std::size_t back = i;
+      for (std::size_t skipped = 0; skipped < outliers_in_a_row && back < size; ++skipped) {
+        back = next_good(back);
+        if (back < size && fits(back)) break;
+      }
+      const bool returns = back < size && stripe.y[back] - y_before <= settings.bridge_mm && fits(back);
+      const std::size_t after = returns ? next_good(back) : size;
+      if (!returns || (after < size && !fits(after))) {
+        start(i);
+      } else {
+        i = back;
+        filter.update(stripe.y[i], stripe.z[i], spacing);
+        take(i);
+      }
+    }
+  }
+}
+
+void PlateRunFinder::drop_short_pieces(const StripeView& stripe, std::size_t min_points,
+                                       double min_length_mm) {
+  std::erase_if(pieces_, [&](const Piece& piece) {
+    const double length = stripe.y[good_[piece.begin + piece.count - 1]] - stripe.y[good_[piece.begin]];
+    return piece.count < min_points || length < min_length_mm;
+  });
+}
+
+// Joins pieces that continue each other over a drop-out, a speck of dirt or a crease: the lines at both ends
+// meet, in the middle of the gap, within less than a step.
+void PlateRunFinder::join_pieces(const StripeView& stripe, const PlateRunSettings& settings) {
+  if (pieces_.empty()) return;
+  std::size_t kept = 0;
+  for (std::size_t k = 1; k < pieces_.size(); ++k) {
+    Piece& before = pieces_[kept];
+    const Piece& after = pieces_[k];
+    const std::span<const std::uint32_t> good(good_);
+    const auto tail =
+        good.subspan(before.begin, before.count).last(std::min<std::size_t>(before.count, line_points));
+    const auto head = good.subspan(after.begin, std::min<std::size_t>(after.count, line_points));
+    const double y_tail = stripe.y[tail.back()], y_head = stripe.y[head.front()],
+                 middle = 0.5 * (y_tail + y_head);
+    const StripeLine left = fit_line(stripe, tail), right = fit_line(stripe, head);
+    const bool flat = std::max(std::abs(left.slope_z), std::abs(right.slope_z)) <= HeightFilter::max_slope;
+    if (flat && y_head - y_tail <= settings.bridge_mm &&
+        std::abs(left.z_at(middle) - right.z_at(middle)) < settings.min_step_mm) {
+      // What lay between the two was dropped; their points move together.
+      std::copy_n(good_.begin() + after.begin, after.count, good_.begin() + before.begin + before.count);
+      before.count += after.count;
+    } else {
+      pieces_[++kept] = after;
+    }
+  }
+  pieces_.resize(kept + 1);
+}
+
+// The first points beyond an edge may have slipped in while the line still allowed them: compare the
+// outermost three with the line through the points inside them.
+void PlateRunFinder::trim_ends(const StripeView& stripe, const PlateRunSettings& settings) {
+  for (Piece& piece : pieces_) {
+    if (piece.count < line_points + trim_points) continue;
+    const auto good = std::span<const std::uint32_t>(good_).subspan(piece.begin, piece.count);
+    const double n = line_points;
+    const auto strays = [&](const StripeLine& line, std::uint32_t i, std::uint32_t inside) {
+      // Standard deviation of a point against a line through n others, extrapolated by up to three points.
+      const double reach = (n / 2 + trim_points) / n;
+      const double sigma = settings.noise_mm * std::sqrt(1 + 1 / n + 12 * reach * reach / n);
+      const double fall = std::abs(stripe.z[i] - stripe.z[inside]),
+                   along = std::abs(stripe.y[i] - stripe.y[inside]);
+      return std::abs(stripe.z[i] - line.z_at(stripe.y[i])) > trim_sigmas * sigma &&
+             fall > HeightFilter::max_slope * along;
+    };
+    // From inside outwards: whatever lies beyond the first wall point goes with it.
+    std::uint32_t at_first = 0, at_last = 0;
+    const std::size_t end = good.size() - 1;
+    const StripeLine head = fit_line(stripe, good.subspan(trim_points, line_points));
+    for (std::uint32_t k = trim_points; k-- > 0 && at_first == 0;) {
+      if (strays(head, good[k], good[k + 1])) at_first = k + 1;
+    }
+    const StripeLine tail = fit_line(stripe, good.last(line_points + trim_points).first(line_points));
+    for (std::uint32_t k = trim_points; k-- > 0 && at_last == 0;) {
+      if (strays(tail, good[end - k], good[end - k - 1])) at_last = k + 1;
+    }
+    piece.begin += at_first;
+    piece.count -= at_first + at_last;
+  }
+}
+
+bool PlateRunFinder::keep_runs(std::uint16_t stripe_index, const StripeView& stripe,
+                               const PlateRunSettings& settings) {
+  drop_short_pieces(stripe, fewest_points, 0.15 * settings.min_run_mm);  // walls are steep, so short
+  join_pieces(stripe, settings);
+  drop_short_pieces(stripe, fewest_points, settings.min_run_mm);
+  join_pieces(stripe, settings);
+  trim_ends(stripe, settings);
+  if (runs_.size() + pieces_.size() > runs_.capacity()) return false;
+  for (const Piece& piece : pieces_) {
+    const auto id = static_cast<std::uint32_t>(runs_.size());
+    runs_.push_back({.begin = piece.begin,
+                     .count = piece.count,
+                     .parent = id,
+                     .stripe = stripe_index,
+                     .linked_forward = false,
+                     .y_first = stripe.y[good_[piece.begin]],
+                     .y_last = stripe.y[good_[piece.begin + piece.count - 1]]});
+  }
+  return true;
+}
+
+std::uint32_t PlateRunFinder::region_of(std::uint32_t run) const {
+  while (runs_[run].parent != run) run = runs_[run].parent;
+  return run;
+}
+
+// Runs on neighbouring stripes belong together where they lie side by side at heights that a sloping plate
+// allows. A stripe that is missing, or has no run there, is looked across as a drop-out would be.
+void PlateRunFinder::link_stripes(std::span<const StripeView> stripes, const PlateRunSettings& settings) {
+  const auto points_of = [&](const Run& run) {
+    return std::span<const std::uint32_t>(good_).subspan(run.begin, run.count);
+  };
+  const auto continues = [&](const Run& a, const Run& b) {
+    const double from = std::max(a.y_first, b.y_first), to = std::min(a.y_last, b.y_last);
+    if (to - from < 0.25 * settings.min_run_mm) return false;
+    int agree = 0;
+    for (const double share : {0.15, 0.5, 0.85}) {
+      const double y = from + share * (to - from);
+      const StripeLine here = line_about(stripes[a.stripe], points_of(a), y, 4);
+      const StripeLine there = line_about(stripes[b.stripe], points_of(b), y, 4);
+      const double dx = std::abs(there.x_at(y) - here.x_at(y));
+      const bool near = b.stripe == a.stripe + 1 || dx <= settings.bridge_mm;
+      agree +=
+          near && std::abs(there.z_at(y) - here.z_at(y)) <= 0.5 * settings.min_step_mm + start_slope * dx;
+    }
+    return agree >= 2;
+  };
+
+  for (int ahead = 1; ahead <= 3; ++ahead) {
+    for (std::uint32_t i = 0; i < runs_.size(); ++i) {
+      const std::size_t next = runs_[i].stripe + ahead;
+      if (runs_[i].linked_forward || next >= stripes.size()) continue;
+      for (std::uint32_t j = first_run_[next]; j < first_run_[next + 1]; ++j) {
+        if (!continues(runs_[i], runs_[j])) continue;
+        runs_[i].linked_forward = true;
+        const std::uint32_t a = region_of(i), b = region_of(j);
+        runs_[std::max(a, b)].parent = std::min(a, b);
+      }
+    }
+    // Short paths: a parent never lies behind its child, so one pass in order flattens every tree.
+    for (Run& run : runs_) run.parent = runs_[run.parent].parent;
+  }
+}
+
+std::size_t PlateRunFinder::nearest_run(std::span<const StripeView> stripes, const Eigen::Vector3d& hint,
+                                        double reach_mm) const {
+  std::size_t nearest = runs_.size();
+  double least = reach_mm;
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    const Run& run = runs_[i];
+    const double y = std::clamp(hint.y(), run.y_first, run.y_last);
+    const auto good = std::span<const std::uint32_t>(good_).subspan(run.begin, run.count);
+    const StripeLine line = line_about(stripes[run.stripe], good, y, 4);
+    const double distance = (Eigen::Vector3d(line.x_at(y), y, line.z_at(y)) - hint).norm();
+    if (distance < least) least = distance, nearest = i;
+  }
+  return nearest;
+}
+
+namespace {
+
+// Where the run leaves the plate: half a spacing beyond its last good point, on the line through the last
+// points. The true edge lies anywhere between the last point and the one that would have followed.
+Eigen::Vector3d edge_beyond(const StripeView& stripe, std::span<const std::uint32_t> good, bool at_last) {
+  const std::size_t n = std::min(good.size(), line_points);
+  const StripeLine line = fit_line(stripe, at_last ? good.last(n) : good.first(n));
+  const double half = 0.5 * spacing_near_end(stripe, good, at_last);
+  const double y = at_last ? stripe.y[good.back()] + half : stripe.y[good.front()] - half;
+  return {line.x_at(y), y, line.z_at(y)};
+}
+
+struct Neighbour {
+  bool exists = false;
+  double gap_mm = 0,
+         rise_mm = 0;  // to the next run on the stripe; how much higher it lies than this one goes on
+};
+
+// A stripe that reports every ray ends at the field's limit whatever the plate's height does to its width there;
+// one that leaves missing points out ends there by its position.
+bool at_field_limit(double y_outward, std::size_t rays_beyond, double spacing,
+                    const PlateRunSettings& settings) {
+  return static_cast<double>(rays_beyond) * spacing <= settings.field_margin_mm ||
+         y_outward >= settings.field_half_y_mm - settings.field_margin_mm;
+}
+
+RunEnd kind_of_end(const Neighbour& beyond, const PlateRunSettings& settings) {
+  if (!beyond.exists) return RunEnd::free_end;
+  if (beyond.gap_mm <= settings.bridge_mm) return beyond.rise_mm > 0 ? RunEnd::hidden : RunEnd::step_down;
+  // Behind a gap: something that towers over the plate throws a shadow on it; anything else leaves the edge
+  // free.
+  const bool towers = beyond.rise_mm > settings.min_step_mm && beyond.gap_mm <= 3 * settings.bridge_mm;
+  return towers ? RunEnd::hidden : RunEnd::free_end;
+}
+
+}  // namespace
+
+std::expected<std::span<const PlateRun>, Error> PlateRunFinder::find(std::span<const StripeView> stripes,
+                                                                     const Eigen::Vector3d& hint,
+                                                                     const PlateRunSettings& settings) {
+  if (const auto begun = begin(stripes); !begun) return std::unexpected(begun.error());
+  if (const auto cut = cut_stripes(stripes.size(), settings); !cut) return std::unexpected(cut.error());
+  return finish(hint, settings);
+}
+
+std::expected<void, Error> PlateRunFinder::begin(std::span<const StripeView> stripes) {
+  std::size_t points = 0;
+  for (const StripeView& stripe : stripes) {
+    assert(stripe.x.size() == stripe.z.size() && stripe.y.size() == stripe.z.size());
+    points += stripe.z.size();
+  }
+  if (stripes.size() > max_stripes_ || points > max_points_) return std::unexpected(Error::capacity);
+
+  good_.clear(), runs_.clear(), first_run_.clear(), found_.clear();
+  stripes_ = stripes;
+  next_stripe_ = 0;
+  return {};
+}
+
+std::expected<bool, Error> PlateRunFinder::cut_stripes(std::size_t at_most,
+                                                       const PlateRunSettings& settings) {
+  const std::size_t end = std::min(stripes_.size(), next_stripe_ + at_most);
+  for (; next_stripe_ < end; ++next_stripe_) {
+    const StripeView& stripe = stripes_[next_stripe_];
+    first_run_.push_back(static_cast<std::uint32_t>(runs_.size()));
+    pieces_.clear();
+    if (!stripe.z.empty()) cut_stripe(stripe, settings);
+    if (!keep_runs(static_cast<std::uint16_t>(next_stripe_), stripe, settings))
+      return std::unexpected(Error::capacity);
+  }
+  return next_stripe_ == stripes_.size();
+}
+
+std::expected<std::span<const PlateRun>, Error> PlateRunFinder::finish(const Eigen::Vector3d& hint,
+                                                                       const PlateRunSettings& settings) {
+  const std::span<const StripeView> stripes = stripes_;
+  first_run_.push_back(static_cast<std::uint32_t>(runs_.size()));
+  link_stripes(stripes, settings);
+
+  const std::size_t seed = nearest_run(stripes, hint, settings.hint_reach_mm);
+  if (seed == runs_.size()) return std::unexpected(Error::not_on_plate);
+  const std::uint32_t plate = region_of(static_cast<std::uint32_t>(seed));
+
+  for (std::uint32_t i = 0; i < runs_.size(); ++i) {
+    if (region_of(i) != plate) continue;
+    const Run& run = runs_[i];
+    const StripeView& stripe = stripes[run.stripe];
+    const auto good = std::span<const std::uint32_t>(good_).subspan(run.begin, run.count);
+    PlateRun out;
+    out.stripe = run.stripe, out.first = good.front(), out.last = good.back();
+    out.edge_first = edge_beyond(stripe, good, false);
+    out.edge_last = edge_beyond(stripe, good, true);
+
+    const auto neighbour = [&](std::uint32_t j, bool above) {
+      const Run& other = runs_[j];
+      const auto theirs = std::span<const std::uint32_t>(good_).subspan(other.begin, other.count);
+      const std::size_t n = std::min(good.size(), line_points), m = std::min(theirs.size(), line_points);
+      const StripeLine line = fit_line(stripe, above ? good.last(n) : good.first(n));
+      const StripeLine far = fit_line(stripe, above ? theirs.first(m) : theirs.last(m));
+      const double gap = above ? other.y_first - run.y_last : run.y_first - other.y_last;
+      const double y = above ? other.y_first : other.y_last;
+      return Neighbour{true, gap, far.z_at(y) - line.z_at(y)};
+    };
+    const bool below = i > first_run_[run.stripe], above = i + 1 < first_run_[run.stripe + 1u];
+    const std::size_t rays_above = stripe.z.size() - 1 - out.last;
+    const bool low_limit =
+        at_field_limit(-run.y_first, out.first, spacing_near_end(stripe, good, false), settings);
+    const bool high_limit =
+        at_field_limit(run.y_last, rays_above, spacing_near_end(stripe, good, true), settings);
+    out.at_first = low_limit ? RunEnd::field_limit
+                             : kind_of_end(below ? neighbour(i - 1, false) : Neighbour{}, settings);
+    out.at_last = high_limit ? RunEnd::field_limit
+                             : kind_of_end(above ? neighbour(i + 1, true) : Neighbour{}, settings);
+    found_.push_back(out);
+  }
+  return std::span<const PlateRun>(found_);
+}
+
+}  // namespace moldloft::geometry

@@ -1,0 +1,64 @@
+// The plan map X(u, v) = (x, y): the bilinearly blended Coons patch of the outline's four sides (thesis eq.
+// 2.65), and its inverse. The plate is explicit (z over x, y), so a point's parameters are those of its plan
+// position: safe where projecting on a wavy base surface is not (field notes on the thesis's wave surface).
+//
+// Outside [0, 1]^2 the sides go on along their end tangents.
+//
+// u runs along sides[0] (corner 0 to corner 1), v along sides[3] reversed (corner 0 to corner 3).
+//
+// Accuracy     the inverse satisfies |X(u, v) - (x, y)| <= 1e-10 mm
+// Cost         a point with a neighbour's (u, v) as guess: 2-3 Newton steps, about 0.15 us
+// Allocation   none in invert(); the constructor copies four curves
+// Failure      Error::folded_map from check(); outside_domain from invert() when the point lies off the plate by more
+//              than the margin asked for
+// Expects      sides that share one uniform clamped knot vector, as OutlineBuilder makes them
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <expected>
+#include <vector>
+
+#include "geometry/edges/outline.hpp"
+
+namespace moldloft::geometry {
+
+struct PlanPoint {
+  Eigen::Vector2d value;
+  Eigen::Matrix2d jacobian;  // columns dX/du, dX/dv
+};
+
+class PlanMap {
+ public:
+  explicit PlanMap(int spans = OutlineSettings{}.spans);  // has room for sides of so many spans
+  explicit PlanMap(const Outline& outline);
+  void assign(const Outline& outline);  // without allocation while there is room
+
+  PlanPoint at(double u, double v) const;
+  std::expected<void, Error> check() const;  // Jacobian positive on a 65 x 65 grid
+  // (u, v) of a plan position, starting from `guess`; outside [0, 1]^2 by at most `margin` it is still given.
+  std::expected<Eigen::Vector2d, Error> invert(const Eigen::Vector2d& xy, const Eigen::Vector2d& guess,
+                                               double margin = 0.0) const;
+
+  const Outline& outline() const { return outline_; }
+
+  // The map as a bicubic B-spline net over knots that contain the sides' knots: exact, since every blend is
+  // bilinear in splines of degree 3. Fills x and y of `surface` for its knot vectors.
+  void to_net(BSplineSurface& surface) const;
+
+ private:
+  // One span of two opposite sides as polynomials in the span's own coordinate, power basis.
+  struct SpanPair {
+    std::array<std::array<double, 4>, 4> coefficient;  // [low x, low y, high x, high y][power]
+  };
+  struct PairValue {
+    Eigen::Vector2d low, high, low_first, high_first;
+  };
+  static PairValue evaluate(const std::vector<SpanPair>&, double t);
+
+  Outline outline_;
+  std::vector<SpanPair> along_u_, along_v_;  // low and high: v = 0 and 1; u = 0 and 1
+  Eigen::Vector2d c00_, c10_, c01_, c11_;
+};
+
+}  // namespace moldloft::geometry

@@ -1,0 +1,292 @@
+#include "geometry/fit/surface_fit.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "geometry/fit/net_solver.hpp"
+
+namespace moldloft::geometry {
+
+namespace {
+
+constexpr int fewest_spans = 4;  // of a side as well: the nets must refine the sides' knots
+
+// Inflates the degrees of freedom in cross-validation (Kim and Gu 2004): what the shots' poses leave behind,
+// beside their offsets, is not independent from point to point, and plain cross-validation would spend
+// control points on it.
+constexpr double dof_inflation = 1.4;
+
+// A net is tried when it has at least this many points for every unknown.
+constexpr double points_an_unknown = 4;
+
+double generalized_cross_validation(const PointTotals& totals, const NetResult& result) {
+  const double n = static_cast<double>(totals.points);
+  const double free = 1 - dof_inflation * result.freedom / n;
+  return free > 0 ? result.squares / n / (free * free) : std::numeric_limits<double>::infinity();
+}
+
+struct Level {
+  Level(int spans_u, int spans_v) : net(spans_u, spans_v) {
+    surface.knots_u = uniform_clamped_knots(spans_u);
+    surface.knots_v = uniform_clamped_knots(spans_v);
+    surface.x = surface.y = surface.z = Eigen::MatrixXd::Zero(spans_u + cubic, spans_v + cubic);
+  }
+  SplineNet net;
+  BSplineSurface surface;
+};
+
+// The finest net and its halvings, in both directions as long as both can be halved, then in the one that
+// can.
+std::vector<std::pair<int, int>> nested_nets(int spans_u, int spans_v) {
+  std::vector<std::pair<int, int>> nets{{spans_u, spans_v}};
+  while (nets.back() != std::pair(fewest_spans, fewest_spans)) {
+    nets.emplace_back(std::max(nets.back().first / 2, fewest_spans),
+                      std::max(nets.back().second / 2, fewest_spans));
+  }
+  return nets;
+}
+
+// Room for the shots' moments: a shot sees a tenth of a plate, every place is seen by a few shots, and small
+// plates, which every shot sees whole, have few shots.
+std::size_t shot_cells_planned(const SurfaceFitSettings& settings) {
+  const std::size_t cells = static_cast<std::size_t>(settings.max_spans_u) * settings.max_spans_v;
+  return settings.shot_sigma_mm > 0 ? std::max<std::size_t>(4 * cells, 16 * 1024) : 0;
+}
+
+}  // namespace
+
+struct SurfaceFit::Work {
+  enum class Phase { adding, merge, solve, compare, finish, done, failed };
+
+  explicit Work(const SurfaceFitSettings& s)
+      : settings(s),
+        solver((s.max_spans_u + 3u) * (s.max_spans_v + 3u),
+               3u * (std::min(s.max_spans_u, s.max_spans_v) + 3) + 3),
+        shots(s.max_shots, s.max_spans_u, s.max_spans_v, shot_cells_planned(s),
+              s.shot_sigma_mm > 0 ? (s.max_spans_u + 3u) * (s.max_spans_v + 3u) : 0) {
+    for (const auto& [u, v] : nested_nets(s.max_spans_u, s.max_spans_v)) {
+      levels.emplace_back(u, v);
+      moments.emplace_back(u, v);
+    }
+  }
+
+  void fold(const Eigen::Vector2d& uv, double height, double weight, int shot);
+  void start_level();
+  void keep_if_best();
+  void finish();
+
+  SurfaceFitSettings settings;
+  std::vector<Level> levels;        // finest first
+  std::vector<MomentGrid> moments;  // of every level; the first takes the points
+  NetSolver solver;
+  ShotOffsets shots;
+  const PlanMap* map = nullptr;
+  PointTotals totals;
+  SurfaceFitReport report;
+  Eigen::Vector2d last_uv{0.5, 0.5};
+  double datum = 0;  // heights are summed relative to the first point's, so that squares keep their digits
+  Phase phase = Phase::adding;
+  Error error = Error::too_few_points;
+  std::size_t level = 0, first_level = 0, best = 0;
+  int row = 0;
+  double best_score = 0, point_sigma = 0;
+};
+
+SurfaceFit::SurfaceFit(const SurfaceFitSettings& settings) {
+  assert(std::has_single_bit(static_cast<unsigned>(settings.max_spans_u)) &&
+         settings.max_spans_u >= fewest_spans);
+  assert(std::has_single_bit(static_cast<unsigned>(settings.max_spans_v)) &&
+         settings.max_spans_v >= fewest_spans);
+  work_ = std::make_unique<Work>(settings);
+}
+
+SurfaceFit::~SurfaceFit() = default;
+
+std::size_t SurfaceFit::bytes() const {
+  std::size_t sum = sizeof(Work) + work_->solver.bytes() + work_->shots.bytes();
+  for (const MomentGrid& grid : work_->moments) sum += grid.bytes();
+  for (const Level& level : work_->levels)
+    sum += level.net.bytes() + 3 * level.surface.z.size() * sizeof(double);
+  return sum;
+}
+
+void SurfaceFit::begin(const PlanMap& map) {
+  work_->map = &map;
+  work_->moments.front().clear();
+  work_->shots.clear();
+  work_->totals = {};
+  work_->report = {};
+  work_->last_uv = {0.5, 0.5};
+  work_->phase = Work::Phase::adding;
+}
+
+void SurfaceFit::Work::fold(const Eigen::Vector2d& uv, double height, double weight, int shot) {
+  const int nu = settings.max_spans_u, nv = settings.max_spans_v;
+  const int i = std::clamp(static_cast<int>(uv.x() * nu), 0, nu - 1),
+            j = std::clamp(static_cast<int>(uv.y() * nv), 0, nv - 1);
+  const BernsteinValues s = bernstein(uv.x() * nu - i), t = bernstein(uv.y() * nv - j);
+  moments.front().cell(i, j).add(s, t, height, weight);
+  if (settings.shot_sigma_mm > 0) shots.add(shot, i, j, s, t, height, weight);
+  ++totals.points;
+  totals.weight += weight;
+  totals.squares += weight * height * height;
+}
+
+std::expected<void, Error> SurfaceFit::add(std::span<const Eigen::Vector3d> world_points, double weight,
+                                           int shot) {
+  Work& work = *work_;
+  assert(work.map != nullptr);
+  if (shot < 0 || shot >= work.settings.max_shots) return std::unexpected(Error::capacity);
+  if (!(weight > 0) || !std::isfinite(weight)) return std::unexpected(Error::not_finite);
+  for (const Eigen::Vector3d& point : world_points) {
+    if (!point.allFinite()) {
+      ++work.report.points_off;
+      continue;
+    }
+    const auto uv = work.map->invert(point.head<2>(), work.last_uv);
+    if (!uv) {
+      ++work.report.points_off;
+      continue;
+    }
+    work.last_uv = *uv;
+    if (work.totals.points == 0) work.datum = point.z();
+    work.fold(*uv, point.z() - work.datum, weight, shot);
+  }
+  return {};
+}
+
+void SurfaceFit::start_solving() {
+  Work& work = *work_;
+  work.shots.finish_adding();
+  work.report.points_used = work.totals.points;
+  work.level = 0, work.row = 0;
+  work.best_score = std::numeric_limits<double>::infinity();
+  work.point_sigma = work.settings.noise_mm;
+  // Nets with more unknowns than the points determine are passed over; their moments are merged all the same.
+  work.first_level = 0;
+  const auto determined = [&](const Level& level) {
+    return static_cast<double>(work.totals.points) >= points_an_unknown * level.net.unknowns();
+  };
+  while (work.first_level + 1 < work.levels.size() && !determined(work.levels[work.first_level]))
+    ++work.first_level;
+  if (work.map == nullptr || !determined(work.levels[work.first_level])) {
+    work.error = Error::too_few_points;
+    work.phase = Work::Phase::failed;
+    return;
+  }
+  if (work.first_level == 0) {
+    work.start_level();
+  } else {
+    work.level = 1, work.phase = Work::Phase::merge;
+  }
+}
+
+void SurfaceFit::Work::start_level() {
+  const Eigen::Vector2d across = map->at(1, 0.5).value - map->at(0, 0.5).value;
+  const Eigen::Vector2d along = map->at(0.5, 1).value - map->at(0.5, 0).value;
+  solver.start({.net = &levels[level].net,
+                .moments = &moments[level],
+                .totals = totals,
+                .length_u_mm = across.norm(),
+                .length_v_mm = along.norm(),
+                .fairing = settings.fairing,
+                .shot_sigma_mm = settings.shot_sigma_mm,
+                .point_sigma_mm = point_sigma},
+               &shots);
+  phase = Phase::solve;
+}
+
+// The offsets are part of every net's model, so a finer net gains nothing by following the shots' steps.
+void SurfaceFit::Work::keep_if_best() {
+  const NetResult& result = solver.result();
+  point_sigma = result.point_sigma_mm;  // all nets are compared under the finest net's estimate
+  // Scores are mean squared errors of prediction, so their difference is the square of what the coarser net misses.
+  // Nets come from fine to coarse: each one within the tolerance of the best so far takes over from it.
+  const double score = generalized_cross_validation(totals, result);
+  if (!(score < best_score + settings.tolerance_mm * settings.tolerance_mm)) return;
+  best_score = std::min(best_score, score), best = level;
+  Level& kept = levels[level];
+  for (int i = 0; i < kept.net.control_u(); ++i) {
+    for (int j = 0; j < kept.net.control_v(); ++j) {
+      kept.surface.z(i, j) = solver.coefficients()[kept.net.index(i, j)] + datum;
+    }
+  }
+  const double n = static_cast<double>(totals.points);
+  report.spans_u = moments[level].cells_u(), report.spans_v = moments[level].cells_v();
+  report.rms_residual_mm = std::sqrt(result.squares / totals.weight);
+  report.sigma_mm = std::sqrt(result.squares / std::max(1.0, n - result.freedom));
+  report.smallest_pivot = result.smallest_pivot;
+  report.empty_cells = result.empty_cells;
+  report.shot_offset_rms_mm = result.offset_rms_mm, report.shot_offset_max_mm = result.offset_max_mm;
+  report.shots_without_offset = shots.exact();
+}
+
+void SurfaceFit::Work::finish() { map->to_net(levels[best].surface); }
+
+std::expected<bool, Error> SurfaceFit::step() {
+  Work& work = *work_;
+  switch (work.phase) {
+    case Work::Phase::adding:
+      return std::unexpected(Error::too_few_points);
+    case Work::Phase::failed:
+      return std::unexpected(work.error);
+    case Work::Phase::done:
+      return true;
+    case Work::Phase::merge: {
+      MomentGrid& grid = work.moments[work.level];
+      grid.merge_row(work.row, work.moments[work.level - 1]);
+      if (++work.row < grid.cells_u()) return false;
+      work.row = 0;
+      if (work.level < work.first_level) {
+        ++work.level;
+      } else {
+        work.start_level();
+      }
+      return false;
+    }
+    case Work::Phase::solve: {
+      const auto solved = work.solver.step();
+      if (!solved) {
+        work.error = solved.error(), work.phase = Work::Phase::failed;
+        return std::unexpected(work.error);
+      }
+      if (*solved) work.phase = Work::Phase::compare;
+      return false;
+    }
+    case Work::Phase::compare:
+      work.keep_if_best();
+      work.phase = ++work.level < work.levels.size() ? Work::Phase::merge : Work::Phase::finish;
+      return false;
+    case Work::Phase::finish:
+      work.finish();
+      work.phase = Work::Phase::done;
+      return true;
+  }
+  return true;
+}
+
+double SurfaceFit::progress() const {
+  const Work& work = *work_;
+  if (work.phase == Work::Phase::done) return 1;
+  if (work.phase == Work::Phase::adding || work.phase == Work::Phase::failed) return 0;
+  // A net costs unknowns^2, near enough: sixteen times the next one.
+  double all = 0, done = 0;
+  for (std::size_t k = 0; k < work.levels.size(); ++k) {
+    const double unknowns = work.levels[k].net.unknowns(), cost = unknowns * unknowns;
+    all += cost;
+    if (k < work.level) done += cost;
+    if (k != work.level) continue;
+    if (work.phase == Work::Phase::solve) done += cost * work.solver.progress();
+    if (work.phase == Work::Phase::compare) done += cost;
+  }
+  return std::min(done / all, 0.999);
+}
+
+const BSplineSurface& SurfaceFit::surface() const { return work_->levels[work_->best].surface; }
+const SurfaceFitReport& SurfaceFit::report() const { return work_->report; }
+
+}  // namespace moldloft::geometry

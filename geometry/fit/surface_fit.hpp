@@ -1,0 +1,71 @@
+// The streaming surface fit: points are folded into Bernstein moments cell by cell and forgotten; nets of 2^k
+// by 2^l spans come out of the same pass; generalized cross-validation picks one.
+//
+// Model        z(u, v) = sum N_i(u) M_j(v) z_ij + d_s, with d_s the unknown height error of shot s (robot
+//              repeatability), a zero-mean random effect with standard deviation shot_sigma_mm: overlapping shots and
+//              neighbours estimate it together with the surface. (u, v) are plan-view parameters (plan_map.hpp)
+// Moments      per cell 7 x 7 of B6 B6 and 4 x 4 of z B3 B3 (field notes, "Bernstein moments"), per shot 4 x 4 of B3 B3
+// Fairing      a thin-plate term, tiny relative to the data, so that cells without points stay defined
+// Frame        world, mm
+// Work         add() costs O(points) and is called with bounded chunks; step() does one bounded piece of the solution
+// Memory       fixed by the settings, never by the number of points; all of it allocated in the constructor
+// Failure      Error::capacity, singular, not_finite, too_few_points
+#pragma once
+
+#include <cstdint>
+#include <expected>
+#include <memory>
+#include <span>
+
+#include "geometry/splines/bspline.hpp"
+#include "geometry/error.hpp"
+#include "geometry/fit/plan_map.hpp"
+
+namespace moldloft::geometry {
+
+struct SurfaceFitSettings {
+  int max_spans_u = 32, max_spans_v = 32;  // finest net, powers of two, at least 4
+  int max_shots = 64;
+  double shot_sigma_mm = 0.013;  // 0: shots are taken as exact
+  // The coarsest net is taken that misses no more than this (rms) of what the best net explains. Errors of pose in the
+  // plane look like steps of height where the plate slopes; below a few micrometres a finer net follows those.
+  double tolerance_mm = 0.005;
+  double noise_mm = 0;    // of a point of weight 1; 0: estimated from the finest net's residual
+  double fairing = 1e-5;  // relative to the data: the ratio of the matrices' traces
+};
+
+struct SurfaceFitReport {
+  std::uint64_t points_used = 0, points_off = 0;  // folded in; outside the outline or rejected
+  int spans_u = 0, spans_v = 0;
+  double rms_residual_mm = 0;  // weighted, of the chosen net, computed from the moments
+  double sigma_mm = 0;         // noise of one point: residual over the degrees of freedom
+  double smallest_pivot = 0;   // relative to the largest: small means a badly determined control point
+  int empty_cells = 0;         // of the chosen net
+  double shot_offset_rms_mm = 0, shot_offset_max_mm = 0;
+  int shots_without_offset = 0;  // taken as exact, since the memory plan had no room for their moments
+};
+
+class SurfaceFit {
+ public:
+  explicit SurfaceFit(const SurfaceFitSettings&);
+  ~SurfaceFit();
+
+  void begin(const PlanMap& map);  // forgets everything; the map must stay alive
+  // Folds points of one shot in. `shot` counts from 0; all points of one shot must be added before another
+  // shot begins. Points off the plate are counted and left out. Wholly bounded by the size of the chunk.
+  std::expected<void, Error> add(std::span<const Eigen::Vector3d> world_points, double weight, int shot);
+
+  void start_solving();
+  std::expected<bool, Error> step();  // one bounded piece; true when the surface is ready
+  double progress() const;            // of the solution, 0..1
+
+  const BSplineSurface& surface() const;
+  const SurfaceFitReport& report() const;
+  std::size_t bytes() const;
+
+ private:
+  struct Work;
+  std::unique_ptr<Work> work_;
+};
+
+}  // namespace moldloft::geometry

@@ -1,0 +1,39 @@
+// moldloft-bench NAME: speeds side by side with peers and limits, in one run. Not a test: nothing here passes
+// or fails, and nothing in continuous integration depends on it.
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <span>
+#include <vector>
+
+#include "bench/benchmark.hpp"
+
+namespace moldloft::bench {
+
+// Each in a file of its own, bench/NAME.cpp.
+std::span<const Benchmark> all_benchmarks() {
+  static const std::vector<Benchmark> all{};
+  return all;
+}
+
+}  // namespace moldloft::bench
+
+int main(int argc, char** argv) {
+  using namespace moldloft::bench;
+  CLI::App app{"Speeds side by side with peers and limits, one run"};
+  app.require_subcommand(1);
+  Options options;
+  bool json = false;
+  for (const Benchmark& benchmark : all_benchmarks()) {
+    CLI::App* command = app.add_subcommand(std::string{benchmark.name}, std::string{benchmark.what});
+    command->add_flag("--json", json, "print one JSON object and nothing else");
+    command->add_flag("--quick", options.quick, "fewer repeats and smaller sizes");
+    command->callback([&] {
+      options.quiet = json;
+      const Json result = benchmark.run(options);
+      if (json) fmt::print("{}\n", result.dump(2));
+    });
+  }
+  CLI11_PARSE(app, argc, argv);
+  return 0;
+}
