@@ -14,8 +14,12 @@ enum class Error {
   outside_domain,  // a point to which no (u, v) belongs
   singular,        // the normal equations have no positive pivot
   knots_not_increasing,
-  capacity,      // more data than the memory plan holds
-  not_on_plate,  // the hint does not lie on anything that was measured
+  capacity,            // more data than the memory plan holds
+  not_on_plate,        // the hint does not lie on anything that was measured
+  too_few_stripes,     // fewer equations than unknown control points
+  coincident_stripes,  // two stripes with one pre-image: they say the same, or contradict each other
+  no_length,           // a stripe whose pre-image begins where it ends
+  preimage_outside,    // a stripe whose pre-image leaves the surface's domain
 };
 
 std::string_view to_string(Error) noexcept;
