@@ -26,19 +26,22 @@ inline BernsteinValues bernstein(double t) {
            t3 * t3}};
 }
 
+// From the Bernstein polynomials of degree k, blossomed at k arguments, to those of degree k + 1 with one more
+// argument t (thesis eq. 2.31 with an argument of its own for every step). In place; `row` has room for k + 2.
+inline void raise_bernstein(double* row, int k, double t) {
+  row[k + 1] = 0;
+  for (int p = k + 1; p > 0; --p) row[p] = (1 - t) * row[p] + t * row[p - 1];
+  row[0] = (1 - t) * row[0];
+}
+
 // R with B_p^n(a + (b - a) t) = sum_l R[p][l] B_l^n(t) (thesis eq. 3.6): the blossom of B_p^n at n - l times
-// a and l times b, built up one argument at a time.
+// a and l times b. restrict_bernstein() of bernstein_form.hpp is the same for a degree known only at run time.
 template <int degree>
 std::array<std::array<double, degree + 1>, degree + 1> restriction(double a, double b) {
   std::array<std::array<double, degree + 1>, degree + 1> r{};
   for (int l = 0; l <= degree; ++l) {
-    std::array<double, degree + 1> row{};
-    row[0] = 1;  // degree 0; every argument raises the degree by one
-    for (int k = 0; k < degree; ++k) {
-      const double t = k < degree - l ? a : b;
-      for (int p = k + 1; p >= 0; --p)
-        row[p] = (p <= k ? (1 - t) * row[p] : 0.0) + (p > 0 ? t * row[p - 1] : 0.0);
-    }
+    std::array<double, degree + 1> row{1};
+    for (int k = 0; k < degree; ++k) raise_bernstein(row.data(), k, k < degree - l ? a : b);
     for (int p = 0; p <= degree; ++p) r[p][l] = row[p];
   }
   return r;
