@@ -10,10 +10,10 @@
 #include <span>
 #include <vector>
 
+#include "geometry/splines/band_cholesky.hpp"
 #include "geometry/error.hpp"
 #include "geometry/fit/shot_offsets.hpp"
 #include "geometry/fit/spline_net.hpp"
-#include "geometry/splines/band_cholesky.hpp"
 
 namespace moldloft::geometry {
 

@@ -12,8 +12,8 @@
 #include <span>
 #include <vector>
 
-#include "geometry/fit/cell_moments.hpp"
 #include "geometry/splines/band_cholesky.hpp"
+#include "geometry/fit/cell_moments.hpp"
 
 namespace moldloft::geometry {
 

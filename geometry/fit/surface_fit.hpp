@@ -17,9 +17,9 @@
 #include <memory>
 #include <span>
 
+#include "geometry/splines/bspline.hpp"
 #include "geometry/error.hpp"
 #include "geometry/fit/plan_map.hpp"
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
 
