@@ -15,10 +15,9 @@
 #include <Eigen/Core>
 #include <expected>
 #include <span>
-#include <string>
 #include <vector>
 
-#include "geometry/error.hpp"
+#include "geometry/fit/matching_failure.hpp"
 #include "geometry/fit/matching_system.hpp"
 #include "geometry/fit/stripe_pieces.hpp"
 #include "geometry/splines/bspline.hpp"
@@ -34,14 +33,6 @@ struct SampledTrack {  // points with their own (u, v), one equation each
   std::vector<Eigen::Vector2d> uv;
   std::vector<double> weight;  // of the squared residual; none: 1 each
 };
-
-struct MatchingFailure {
-  Error what;
-  int stripe = -1,
-      other = -1;    // the stripe that is wrong (stripes first, sampled tracks after them), and its double
-  NetIndex control;  // the control point that the stripes leave free
-};
-std::string describe(const MatchingFailure&);
 
 // A piece counts once as it is (the thesis), or by its length in (u, v): a sliver that a knot line cuts off would
 // else weigh like a whole span.

@@ -3,14 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <string>
+#include <vector>
 
 namespace moldloft::geometry {
 
 namespace {
-
-constexpr double same_place =
-    1e-9;  // of the domain: a thousandth of what any device can tell apart on a plate
 
 std::expected<void, Error> check_samples(const SampledTrack& track, std::span<const double> knots_u,
                                          std::span<const double> knots_v) {
@@ -75,19 +72,9 @@ std::expected<void, MatchingFailure> check_tracks(std::span<const double> knots_
     if (const auto good = check_samples(samples[s], knots_u, knots_v); !good)
       return blame(good.error(), stripes.size() + s);
   const double size = std::max(knots_u.back() - knots_u.front(), knots_v.back() - knots_v.front());
-  if (const auto [first, second] = find_coincident(from, to, same_place * size); second >= 0)
+  if (const auto [first, second] = find_coincident(from, to, nearest_stripes * size); second >= 0)
     return std::unexpected(MatchingFailure{Error::coincident_stripes, straight[second], straight[first], {}});
   return {};
-}
-
-std::string describe(const MatchingFailure& failure) {
-  std::string words{to_string(failure.what)};
-  if (failure.stripe >= 0) words += ": stripe " + std::to_string(failure.stripe);
-  if (failure.other >= 0) words += ", which is where stripe " + std::to_string(failure.other) + " is";
-  if (failure.control.i >= 0)
-    words += ": control point (" + std::to_string(failure.control.i) + ", " +
-             std::to_string(failure.control.j) + ")";
-  return words;
 }
 
 }  // namespace moldloft::geometry

@@ -16,6 +16,9 @@ std::expected<void, MatchingFailure> check_tracks(std::span<const double> knots_
                                                   std::span<const StripeTrack>,
                                                   std::span<const SampledTrack>);
 
+// Of the domain: a thousandth of what any device can tell apart on a plate.
+constexpr double nearest_stripes = 1e-9;
+
 // Pairs of straight lines with the same two ends within `nearest`, in either direction: the first that are found.
 struct CoincidentPair {
   int first = -1, second = -1;  // -1: there is none

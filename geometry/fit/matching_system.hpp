@@ -10,14 +10,10 @@
 #include <Eigen/Core>
 #include <expected>
 
-#include "geometry/error.hpp"
+#include "geometry/fit/matching_failure.hpp"
 #include "geometry/splines/band_cholesky.hpp"
 
 namespace moldloft::geometry {
-
-struct NetIndex {
-  int i = -1, j = -1;  // along u, along v
-};
 
 struct PivotReport {
   double smallest = 1;  // pivot / diagonal: the share of a control point's weight that is its own

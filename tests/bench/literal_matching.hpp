@@ -4,19 +4,22 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
+#include <algorithm>
 #include <vector>
 
 namespace moldloft::bench {
 
-inline double literal_factorial(int n) {
-  double product = 1;
-  for (int i = 2; i <= n; ++i) product *= i;
-  return product;
-}
-
+// Pascal's triangle, once: only the Bernstein polynomials are at stake.
 inline double literal_binomial(int n, int i) {
-  return std::round(literal_factorial(n) / (literal_factorial(i) * literal_factorial(n - i)));
+  constexpr int most = 64;
+  static const std::vector<double> triangle = [] {
+    std::vector<double> c(most * most, 0.0);
+    for (int row = 0; row < most; ++row)
+      for (int k = 0; k <= row; ++k)
+        c[row * most + k] = k == 0 || k == row ? 1 : c[(row - 1) * most + k - 1] + c[(row - 1) * most + k];
+    return c;
+  }();
+  return triangle[n * most + i];
 }
 
 struct ByDefinition {  // eq. 2.27
@@ -49,7 +52,8 @@ Eigen::MatrixXd literal_rows(int n1, int n2, const Eigen::Vector2d& a, const Eig
         for (int l = k; l <= n1 - i + k; l++)
           for (int p = 0; p <= j; p++)
             for (int q = p; q <= n2 - j + p; q++) {
-              const double w = Bernstein::bernstein(k, l, b.x()) * Bernstein::bernstein(i - k, n1 - l, a.x()) *
+              const double w = Bernstein::bernstein(k, l, b.x()) *
+                               Bernstein::bernstein(i - k, n1 - l, a.x()) *
                                Bernstein::bernstein(p, q, b.y()) * Bernstein::bernstein(j - p, n2 - q, a.y());
               rows(l + q, i * (n2 + 1) + j) +=
                   literal_binomial(n1, l) * literal_binomial(n2, q) / literal_binomial(r, l + q) * w;
@@ -63,7 +67,8 @@ inline Eigen::MatrixX3d literal_side(const Eigen::MatrixX3d& d, int r) {
   Eigen::MatrixX3d g = Eigen::MatrixX3d::Zero(r + 1, 3);
   for (int p = 0; p <= r; p++)
     for (int j = std::max(0, p - r + n3); j <= std::min(n3, p); j++)
-      g.row(p) += literal_binomial(r - n3, p - j) * literal_binomial(n3, j) / literal_binomial(r, p) * d.row(j);
+      g.row(p) +=
+          literal_binomial(r - n3, p - j) * literal_binomial(n3, j) / literal_binomial(r, p) * d.row(j);
   return g;
 }
 
