@@ -7,7 +7,8 @@
 //
 // Shapes       control point (i, j) of the net in row i (degree_v + 1) + j, columns x, y, z
 // Units        mm in, mm out; the pre-images lie in [0, 1]^2
-// Accuracy     a surface of these degrees, its stripes exact, comes back within 64 condition eps of its size
+// Accuracy     a surface of these degrees, its stripes exact, comes back within unknowns condition eps of its size,
+//              by normal equations within unknowns condition^2 eps
 // Cost         (degree_u + 1)^2 (degree_v + 1)^2 a stripe for the matrix; 2 rows unknowns^2 to solve by QR, a quarter
 //              of it by normal equations
 // Allocation   the matrix, a copy to factor, the result

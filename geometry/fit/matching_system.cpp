@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 
 namespace moldloft::geometry {
 
@@ -47,11 +48,17 @@ void MatchingSystem::add(int first_u, int first_v, const Gram& gram) {
 }
 
 std::expected<PivotReport, NetIndex> MatchingSystem::factor() {
-  Eigen::VectorXd diagonal(size());
+  Eigen::VectorXd diagonal(size()), row_sum = Eigen::VectorXd::Zero(size());
   for (int n = 0; n < size(); ++n) {
+    row_sum[n] += band_.entry(n, n);
+    for (int below = n + 1; below <= std::min(size() - 1, n + band_.half_band()); ++below) {
+      const double entry = std::abs(band_.entry(below, n));
+      row_sum[n] += entry, row_sum[below] += entry;
+    }
     diagonal[n] = band_.entry(n, n);
     if (!(diagonal[n] > 0)) return std::unexpected(control_of(n));
   }
+  largest_row_sum_ = row_sum.maxCoeff();
   const bool done = band_.factor(0, size());
   PivotReport report;
   for (int n = 0; n < size(); ++n) {
@@ -79,6 +86,21 @@ void MatchingSystem::solve(Eigen::MatrixX3d& side) const {
     band_.solve_lower(column, 0, size());
     band_.solve_upper(column, 0, size());
   }
+}
+
+double MatchingSystem::condition() const {
+  constexpr int steps = 10;
+  Eigen::VectorXd x(size());
+  for (int n = 0; n < size(); ++n) x[n] = std::cos(1.0 + 2.0 * n);  // no eigenvector is orthogonal to it by design
+  double inverse = 0;
+  for (int step = 0; step < steps; ++step) {
+    x.normalize();
+    const std::span<double> column(x.data(), static_cast<std::size_t>(size()));
+    band_.solve_lower(column, 0, size());
+    band_.solve_upper(column, 0, size());
+    inverse = x.norm();
+  }
+  return largest_row_sum_ * inverse;
 }
 
 }  // namespace moldloft::geometry

@@ -40,7 +40,8 @@ TEST_CASE("the rows times the control points are the Bernstein coefficients of t
   std::uniform_real_distribution<double> unit(0, 1);
   for (const auto& [n1, n2] : {std::pair{3, 3}, {4, 7}, {24, 24}}) {
     const Vector2d a(unit(random), unit(random)), b(unit(random), unit(random));
-    const Eigen::VectorXd net = Eigen::VectorXd::NullaryExpr((n1 + 1) * (n2 + 1), [&] { return unit(random); });
+    const Eigen::VectorXd net =
+        Eigen::VectorXd::NullaryExpr((n1 + 1) * (n2 + 1), [&] { return unit(random); });
     const Eigen::VectorXd form = rows_of(n1, n2, a, b) * net;
     for (const double t : {0.0, 0.2, 0.5, 0.77, 1.0}) {
       const Vector2d uv = (1 - t) * a + t * b;
@@ -72,11 +73,13 @@ TEST_CASE("the right side is the stripe, its degree raised as the thesis raises 
   }
 }
 
-TEST_CASE("the bicubic rows of a piece are those of a Bezier patch whose control points knot insertion gives") {
+TEST_CASE(
+    "the bicubic rows of a piece are those of a Bezier patch whose control points knot insertion gives") {
   const std::vector<double> u{0, 0, 0, 0, 0.2, 0.5, 0.9, 1, 1, 1, 1}, v{0, 0, 0, 0, 0.3, 0.6, 1, 1, 1, 1};
   const int ku = 5, kv = 4;  // cell [0.5, 0.9] x [0.3, 0.6]
   const Vector2d a(0.55, 0.58), b(0.83, 0.31);
-  const BicubicRows rows = bicubic_rows(span_restriction(u, ku, a.x(), b.x()), span_restriction(v, kv, a.y(), b.y()));
+  const BicubicRows rows =
+      bicubic_rows(span_restriction(u, ku, a.x(), b.x()), span_restriction(v, kv, a.y(), b.y()));
 
   // Equations (3.20-3.34): the patch's control points from the B-spline's, then (3.13) on the patch.
   const Eigen::Matrix4d to_u = span_restriction(u, ku, u[ku], u[ku + 1]);

@@ -55,7 +55,8 @@ TEST_CASE("a straight pre-image is cut where it crosses the knot lines and at th
   }
 }
 
-TEST_CASE("a cut that both directions share is one cut, and a pre-image on a knot line is cut only across it") {
+TEST_CASE(
+    "a cut that both directions share is one cut, and a pre-image on a knot line is cut only across it") {
   const auto one = uniform_clamped_knots(1), eight = uniform_clamped_knots(8);
   CHECK(cut(straight_preimage({0, 0}, {1, 1}), one, eight, eight).size() == 8);
   CHECK(cut(straight_preimage({1, 0}, {0, 1}), eight, eight, eight).size() == 8);
@@ -106,8 +107,10 @@ TEST_CASE("what is wrong with a pre-image or with knots has a name") {
   CHECK(what_is_wrong({{0.0}, {{0.1, 0.1}}}) == Error::too_few_points);
   CHECK(what_is_wrong({{0.0, 0.7, 0.6, 1.0}, {{0, 0}, {0.1, 0}, {0.2, 0}, {0.3, 0}}}) ==
         Error::knots_not_increasing);
-  CHECK(what_is_wrong({{0.0, 0.5}, {{0, 0}, {0.1, 0}}}) == Error::preimage_outside);  // the stripe goes on to t = 1
-  CHECK(check_knots(std::vector<double>{0, 0, 0, 0, 0.6, 0.5, 1, 1, 1, 1}).error() == Error::knots_not_increasing);
+  CHECK(what_is_wrong({{0.0, 0.5}, {{0, 0}, {0.1, 0}}}) ==
+        Error::preimage_outside);  // the stripe goes on to t = 1
+  CHECK(check_knots(std::vector<double>{0, 0, 0, 0, 0.6, 0.5, 1, 1, 1, 1}).error() ==
+        Error::knots_not_increasing);
   CHECK(check_knots(std::vector<double>{0, 0, 0, 0, 0.5, 0.5, 0.5, 0.5, 0.5, 1, 1, 1, 1}).error() ==
         Error::knots_not_increasing);
   CHECK(check_knots(std::vector<double>{0, 0, 0, 0, nan, 1, 1, 1, 1}).error() == Error::not_finite);
