@@ -20,6 +20,24 @@ std::string_view to_string(Error error) noexcept {
       return "the data do not determine the surface";
     case Error::knots_not_increasing:
       return "knots decrease";
+    case Error::knots_wrong_count:
+      return "the number of knots does not fit the control points and the degree";
+    case Error::knots_not_clamped:
+      return "the end knots are not clamped, or the domain has no length";
+    case Error::knot_too_often:
+      return "an interior knot stands more often than the degree allows";
+    case Error::repeated_points:
+      return "consecutive points lie in one place, or their parameters do not increase";
+    case Error::span_without_points:
+      return "too few points lie where one of the control points acts";
+    case Error::tolerance_not_met:
+      return "no curve that was tried comes as close as asked for";
+    case Error::corners_apart:
+      return "the ends of the boundary curves do not meet";
+    case Error::coincident_curves:
+      return "neighbouring curves lie in one place";
+    case Error::curves_not_compatible:
+      return "the curves do not share one knot vector and degree";
     case Error::capacity:
       return "more data than the memory plan holds";
     case Error::not_on_plate:

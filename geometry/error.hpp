@@ -14,12 +14,21 @@ enum class Error {
   outside_domain,  // a point to which no (u, v) belongs
   singular,        // the normal equations have no positive pivot
   knots_not_increasing,
-  capacity,            // more data than the memory plan holds
-  not_on_plate,        // the hint does not lie on anything that was measured
-  too_few_stripes,     // fewer equations than unknown control points
-  coincident_stripes,  // two stripes with one pre-image: they say the same, or contradict each other
-  no_length,           // a stripe whose pre-image begins where it ends
-  preimage_outside,    // a stripe whose pre-image leaves the surface's domain
+  knots_wrong_count,      // not as many as control points and degree ask for
+  knots_not_clamped,      // ends that do not stand degree + 1 times, or no length between them
+  knot_too_often,         // an interior knot that stands more than degree times
+  repeated_points,        // consecutive points in one place, or parameters that do not increase
+  span_without_points,    // Schoenberg and Whitney: some control point sees no data of its own
+  tolerance_not_met,      // the closest curve there is stays farther off than asked for
+  corners_apart,          // boundary curves whose ends do not meet
+  coincident_curves,      // neighbouring curves in one place: no parameter lies between them
+  curves_not_compatible,  // different knots or degrees where one set is asked for
+  capacity,               // more data than the memory plan holds
+  not_on_plate,           // the hint does not lie on anything that was measured
+  too_few_stripes,        // fewer equations than unknown control points
+  coincident_stripes,     // two stripes with one pre-image: they say the same, or contradict each other
+  no_length,              // a stripe whose pre-image begins where it ends
+  preimage_outside,       // a stripe whose pre-image leaves the surface's domain
 };
 
 std::string_view to_string(Error) noexcept;

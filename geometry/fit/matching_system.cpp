@@ -91,7 +91,8 @@ void MatchingSystem::solve(Eigen::MatrixX3d& side) const {
 double MatchingSystem::condition() const {
   constexpr int steps = 10;
   Eigen::VectorXd x(size());
-  for (int n = 0; n < size(); ++n) x[n] = std::cos(1.0 + 2.0 * n);  // no eigenvector is orthogonal to it by design
+  for (int n = 0; n < size(); ++n)
+    x[n] = std::cos(1.0 + 2.0 * n);  // no eigenvector is orthogonal to it by design
   double inverse = 0;
   for (int step = 0; step < steps; ++step) {
     x.normalize();

@@ -1,59 +1,123 @@
 #include "geometry/splines/bspline.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
+#include <cstring>
 
 namespace moldloft::geometry {
 
-std::vector<double> uniform_clamped_knots(int spans) {
-  assert(spans >= 1);
-  std::vector<double> knots(spans + 1 + 2 * cubic, 0.0);
-  for (int i = 0; i <= spans; ++i) knots[cubic + i] = static_cast<double>(i) / spans;
-  std::fill(knots.end() - cubic, knots.end(), 1.0);
-  return knots;
+namespace {
+
+using BasisToSecond = std::array<double, 3 * (most_spline_degree + 1)>;
+
+// Two doubles side by side: what every 64-bit machine has registers for, so that one order of summation serves all.
+using Pair [[gnu::vector_size(16)]] = double;
+
+Pair first_of(Pair a, Pair b) { return __builtin_shufflevector(a, b, 0, 2); }
+Pair second_of(Pair a, Pair b) { return __builtin_shufflevector(a, b, 1, 3); }
+Pair load(const double* from) {
+  Pair p;
+  std::memcpy(&p, from, sizeof p);
+  return p;
+}
+void store(double* to, Pair p) { std::memcpy(to, &p, sizeof p); }
+
+// Four numbers along u: control points, or basis functions.
+struct Four {
+  Pair low, high;
+};
+// The sums a . w and b . w side by side; the four products of either are added (0 + 2) + (1 + 3).
+Pair dots(const Four& a, const Four& b, const Four& w) {
+  const Pair pa = a.low * w.low + a.high * w.high, pb = b.low * w.low + b.high * w.high;
+  return first_of(pa, pb) + second_of(pa, pb);
+}
+Pair dots(const Four& a, const Four& wa, const Four& b, const Four& wb) {
+  const Pair pa = a.low * wa.low + a.high * wa.high, pb = b.low * wb.low + b.high * wb.high;
+  return first_of(pa, pb) + second_of(pa, pb);
 }
 
-int find_span(std::span<const double> knots, double t) {
-  const int last = static_cast<int>(knots.size()) - cubic - 2;
-  if (!(t > knots[cubic])) return cubic;
-  if (t >= knots[last + 1]) {  // the last span that is not empty
-    int k = last;
-    while (k > cubic && knots[k] >= knots[k + 1]) --k;
-    return k;
+// The rows of a bicubic patch summed along v: with the values of the basis there, its first, its second derivatives.
+struct SummedAlongV {
+  Four value, first, second;
+};
+
+[[gnu::always_inline]] inline SummedAlongV sum_along_v(const double* patch, std::ptrdiff_t stride,
+                                                       const CubicRow<Pair>& along_v) {
+  SummedAlongV sums;
+  const auto column = [&](int j, auto&& put) {
+    const Pair low = load(patch + j * stride), high = load(patch + j * stride + 2);
+    put(sums.value.low, along_v.value[j] * low), put(sums.value.high, along_v.value[j] * high);
+    put(sums.first.low, along_v.first[j] * low), put(sums.first.high, along_v.first[j] * high);
+    put(sums.second.low, along_v.second[j] * low), put(sums.second.high, along_v.second[j] * high);
+  };
+  column(0, [](Pair& sum, Pair term) { sum = term; });
+  for (int j = 1; j < 4; ++j) column(j, [](Pair& sum, Pair term) { sum += term; });
+  return sums;
+}
+
+SurfacePoint bicubic_at(const BSplineSurface& s, int ku, double u, int kv, double v) {
+  Pair knot[6];  // lanes: u, v
+  for (int i = 0; i < 6; ++i) knot[i] = Pair{s.knots_u[ku - 2 + i], s.knots_v[kv - 2 + i]};
+  const CubicRow<Pair> basis = cubic_row(knot, Pair{u, v});
+  const auto along_u = [](const Pair(&of)[4]) {
+    return Four{first_of(of[0], of[1]), first_of(of[2], of[3])};
+  };
+  CubicRow<Pair> along_v;  // lanes: v, v
+  for (int j = 0; j < 4; ++j) {
+    along_v.value[j] = second_of(basis.value[j], basis.value[j]);
+    along_v.first[j] = second_of(basis.first[j], basis.first[j]);
+    along_v.second[j] = second_of(basis.second[j], basis.second[j]);
   }
-  const auto first = knots.begin() + cubic;
-  return static_cast<int>(std::upper_bound(first, knots.begin() + last + 1, t) - knots.begin()) - 1;
+  const Four value = along_u(basis.value), first = along_u(basis.first), second = along_u(basis.second);
+
+  const std::ptrdiff_t stride = s.x.rows(), corner = ku - cubic + (kv - cubic) * stride;
+  const SummedAlongV x = sum_along_v(s.x.data() + corner, stride, along_v);
+  const SummedAlongV y = sum_along_v(s.y.data() + corner, stride, along_v);
+  const SummedAlongV z = sum_along_v(s.z.data() + corner, stride, along_v);
+
+  SurfacePoint point;
+  store(point.value.data(), dots(x.value, y.value, value));
+  store(point.du.data(), dots(x.value, y.value, first));
+  store(point.duu.data(), dots(x.value, y.value, second));
+  store(point.dv.data(), dots(x.first, y.first, value));
+  store(point.duv.data(), dots(x.first, y.first, first));
+  store(point.dvv.data(), dots(x.second, y.second, value));
+  const Pair z1 = dots(z.value, value, z.value, first), z2 = dots(z.value, second, z.first, value),
+             z3 = dots(z.first, first, z.second, value);
+  point.value.data()[2] = z1[0], point.du.data()[2] = z1[1];
+  point.duu.data()[2] = z2[0], point.dv.data()[2] = z2[1];
+  point.duv.data()[2] = z3[0], point.dvv.data()[2] = z3[1];
+  return point;
 }
 
-BasisValues cubic_basis(std::span<const double> knots, int k, double t) {
-  // The recurrence raises the degree once a row: every entry is a sum of nonnegative terms inside the span,
-  // so nothing cancels. The rows of degree 1 and 2 give the derivatives by differences (thesis eq. 2.45).
-  const double left1 = t - knots[k], left2 = t - knots[k - 1], left3 = t - knots[k - 2];
-  const double right1 = knots[k + 1] - t, right2 = knots[k + 2] - t, right3 = knots[k + 3] - t;
-
-  const double inv1 = 1.0 / (knots[k + 1] - knots[k]);
-  const double a0 = right1 * inv1, a1 = left1 * inv1;  // degree 1
-
-  const double inv20 = 1.0 / (knots[k + 1] - knots[k - 1]), inv21 = 1.0 / (knots[k + 2] - knots[k]);
-  const double q0 = a0 * inv20, q1 = a1 * inv21;
-  const double b0 = right1 * q0, b1 = left2 * q0 + right2 * q1, b2 = left1 * q1;  // degree 2
-
-  const double inv30 = 1.0 / (knots[k + 1] - knots[k - 2]), inv31 = 1.0 / (knots[k + 2] - knots[k - 1]),
-               inv32 = 1.0 / (knots[k + 3] - knots[k]);
-  const double c0 = b0 * inv30, c1 = b1 * inv31, c2 = b2 * inv32;
-
-  BasisValues basis;
-  basis.value = {right1 * c0, left3 * c0 + right2 * c1, left2 * c1 + right3 * c2, left1 * c2};
-  basis.first = {-3 * c0, 3 * (c0 - c1), 3 * (c1 - c2), 3 * c2};
-  // Second derivatives: the first derivatives of the degree-2 row, differenced once more.
-  const double d0 = -2 * q0 * inv30, d1 = 2 * (q0 - q1) * inv31, d2 = 2 * q1 * inv32;
-  basis.second = {-3 * d0, 3 * (d0 - d1), 3 * (d1 - d2), 3 * d2};
-  return basis;
+SurfacePoint any_degree_at(const BSplineSurface& s, int ku, double u, int kv, double v) {
+  BasisToSecond bu, bv;
+  basis_derivatives(s.knots_u, s.degree_u, ku, u, 2, bu);
+  basis_derivatives(s.knots_v, s.degree_v, kv, v, 2, bv);
+  const int wu = s.degree_u + 1, wv = s.degree_v + 1;
+  SurfacePoint point;
+  const Eigen::MatrixXd* nets[3] = {&s.x, &s.y, &s.z};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::ptrdiff_t stride = nets[axis]->rows();
+    const double* patch = nets[axis]->data() + (ku - s.degree_u) + (kv - s.degree_v) * stride;
+    double value = 0, du = 0, dv = 0, duu = 0, duv = 0, dvv = 0;
+    for (int j = 0; j < wv; ++j) {
+      double row = 0, row_u = 0, row_uu = 0;
+      for (int i = 0; i < wu; ++i) {
+        const double p = patch[j * stride + i];
+        row += bu[i] * p, row_u += bu[wu + i] * p, row_uu += bu[2 * wu + i] * p;
+      }
+      value += bv[j] * row, du += bv[j] * row_u, duu += bv[j] * row_uu;
+      dv += bv[wv + j] * row, duv += bv[wv + j] * row_u, dvv += bv[2 * wv + j] * row;
+    }
+    point.value[axis] = value, point.du[axis] = du, point.dv[axis] = dv;
+    point.duu[axis] = duu, point.duv[axis] = duv, point.dvv[axis] = dvv;
+  }
+  return point;
 }
 
-double greville(std::span<const double> knots, int i) {
-  return (knots[i + 1] + knots[i + 2] + knots[i + 3]) / 3;
-}
+}  // namespace
 
 double refined_coefficient(std::span<const double> coarse, std::span<const double> coefficients,
                            std::span<const double> fine, int i) {
@@ -73,48 +137,77 @@ double refined_coefficient(std::span<const double> coarse, std::span<const doubl
   return d[cubic];
 }
 
-CurvePoint2 PlanCurve::at(double t) const {
-  t = std::clamp(t, knots[cubic], knots[knots.size() - cubic - 1]);
-  const int k = find_span(knots, t);
-  const BasisValues basis = cubic_basis(knots, k, t);
-  CurvePoint2 point{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
-  for (int i = 0; i <= cubic; ++i) {
-    const Eigen::Vector2d& p = control[k - cubic + i];
-    point.value += basis.value[i] * p;
-    point.first += basis.first[i] * p;
-    point.second += basis.second[i] * p;
+template <int dim>
+CurvePoint<dim> BSplineCurve<dim>::at(double t) const {
+  t = std::clamp(t, begin(), end());
+  const int k = find_span(knots, t, degree);
+  const Point* p = &control[k - degree];
+  CurvePoint<dim> point{Point::Zero(), Point::Zero(), Point::Zero()};
+  const auto add = [&](int i, double value, double first, double second) {
+    point.value += value * p[i], point.first += first * p[i], point.second += second * p[i];
+  };
+  if (degree == cubic) {
+    const BasisValues basis = cubic_basis(knots, k, t);
+    for (int i = 0; i <= cubic; ++i) add(i, basis.value[i], basis.first[i], basis.second[i]);
+    return point;
   }
+  BasisToSecond basis;
+  basis_derivatives(knots, degree, k, t, 2, basis);
+  const int width = degree + 1;
+  for (int i = 0; i < width; ++i) add(i, basis[i], basis[width + i], basis[2 * width + i]);
   return point;
 }
 
-SurfacePoint BSplineSurface::at(double u, double v) const {
-  u = std::clamp(u, knots_u[cubic], knots_u[knots_u.size() - cubic - 1]);
-  v = std::clamp(v, knots_v[cubic], knots_v[knots_v.size() - cubic - 1]);
-  const int ku = find_span(knots_u, u), kv = find_span(knots_v, v);
-  const BasisValues bu = cubic_basis(knots_u, ku, u), bv = cubic_basis(knots_v, kv, v);
-  SurfacePoint point;
-  const Eigen::MatrixXd* nets[3] = {&x, &y, &z};
-  for (int axis = 0; axis < 3; ++axis) {
-    double value = 0, du = 0, dv = 0, duu = 0, duv = 0, dvv = 0;
-    for (int j = 0; j <= cubic; ++j) {
-      double row = 0, row_u = 0, row_uu = 0;
-      for (int i = 0; i <= cubic; ++i) {
-        const double p = (*nets[axis])(ku - cubic + i, kv - cubic + j);
-        row += bu.value[i] * p;
-        row_u += bu.first[i] * p;
-        row_uu += bu.second[i] * p;
-      }
-      value += bv.value[j] * row;
-      du += bv.value[j] * row_u;
-      duu += bv.value[j] * row_uu;
-      dv += bv.first[j] * row;
-      duv += bv.first[j] * row_u;
-      dvv += bv.second[j] * row;
+template <int dim>
+typename BSplineCurve<dim>::Point BSplineCurve<dim>::de_boor(double t) const {
+  t = std::clamp(t, begin(), end());
+  const int k = find_span(knots, t, degree);
+  std::array<Point, most_spline_degree + 1> d;
+  std::copy_n(control.begin() + (k - degree), degree + 1, d.begin());
+  for (int level = 1; level <= degree; ++level) {
+    for (int j = degree; j >= level; --j) {
+      const double low = knots[k - degree + j], high = knots[k + 1 + j - level];
+      d[j] = ((high - t) / (high - low)) * d[j - 1] + ((t - low) / (high - low)) * d[j];
     }
-    point.value[axis] = value, point.du[axis] = du, point.dv[axis] = dv;
-    point.duu[axis] = duu, point.duv[axis] = duv, point.dvv[axis] = dvv;
   }
-  return point;
+  return d[degree];
+}
+
+template struct BSplineCurve<1>;
+template struct BSplineCurve<2>;
+template struct BSplineCurve<3>;
+
+SurfacePoint BSplineSurface::at(double u, double v) const {
+  u = std::clamp(u, knots_u[degree_u], knots_u[knots_u.size() - degree_u - 1]);
+  v = std::clamp(v, knots_v[degree_v], knots_v[knots_v.size() - degree_v - 1]);
+  const int ku = find_span(knots_u, u, degree_u), kv = find_span(knots_v, v, degree_v);
+  return bicubic() ? bicubic_at(*this, ku, u, kv, v) : any_degree_at(*this, ku, u, kv, v);
+}
+
+template <int dim>
+std::expected<void, Error> check(const BSplineCurve<dim>& curve) {
+  if (const auto knots = check_knots(curve.knots, curve.degree, static_cast<int>(curve.control.size()));
+      !knots)
+    return knots;
+  for (const auto& point : curve.control)
+    if (!point.allFinite()) return std::unexpected(Error::not_finite);
+  return {};
+}
+template std::expected<void, Error> check(const BSplineCurve<1>&);
+template std::expected<void, Error> check(const BSplineCurve<2>&);
+template std::expected<void, Error> check(const BSplineCurve<3>&);
+
+std::expected<void, Error> check(const BSplineSurface& surface) {
+  if (const auto knots = check_knots(surface.knots_u, surface.degree_u, surface.control_u()); !knots)
+    return knots;
+  if (const auto knots = check_knots(surface.knots_v, surface.degree_v, surface.control_v()); !knots)
+    return knots;
+  for (const Eigen::MatrixXd* net : {&surface.x, &surface.y, &surface.z}) {
+    if (net->rows() != surface.x.rows() || net->cols() != surface.x.cols())
+      return std::unexpected(Error::knots_wrong_count);
+    if (!net->allFinite()) return std::unexpected(Error::not_finite);
+  }
+  return {};
 }
 
 }  // namespace moldloft::geometry

@@ -112,7 +112,8 @@ TEST_CASE("where the normal equations break down the condition says so, and QR g
   std::vector<BezierStripe> stripes;
   for (int s = 0; s < 54; ++s) {
     const double column = s / 18, row = s / 6 % 3, offset = (s % 6 + 0.5) / 18;
-    BezierStripe stripe{{}, Vector2d(column / 3, row / 3 + offset), Vector2d((column + 1) / 3, row / 3 + 0.9 * offset)};
+    BezierStripe stripe{
+        {}, Vector2d(column / 3, row / 3 + offset), Vector2d((column + 1) / 3, row / 3 + 0.9 * offset)};
     stripe.control = bench::literal_rows<bench::ByRecurrence>(n, n, stripe.from, stripe.to) * net;
     stripes.push_back(stripe);
   }

@@ -239,8 +239,7 @@ TEST_CASE("a stripe with a bent pre-image is matched on each of its straight par
   REQUIRE(surface.has_value());
   for (double u = 0; u <= 1; u += 0.09)
     for (double v = 0; v <= 1; v += 0.07)
-      CHECK((surface->at(u, v).value - position({u, v})).norm() <
-            rounding_of(*fit));
+      CHECK((surface->at(u, v).value - position({u, v})).norm() < rounding_of(*fit));
 }
 
 TEST_CASE("points with parameters of their own fill in where no stripe went") {
@@ -267,8 +266,7 @@ TEST_CASE("points with parameters of their own fill in where no stripe went") {
     REQUIRE(surface.has_value());
     CHECK(net_distance(*surface, truth) < rounding_of(*fit));
     CHECK(fit->report().samples == 400);
-    CHECK(fit->residual(stripes.control, data, *surface).max_mm <
-          rounding_of(*fit));
+    CHECK(fit->residual(stripes.control, data, *surface).max_mm < rounding_of(*fit));
   }
 }
 

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <random>
 
+#include "geometry/heap_watch.hpp"
+#include "geometry/splines/spline_samples.hpp"
+
 using namespace moldloft::geometry;
 
 namespace {
@@ -98,4 +101,122 @@ TEST_CASE("a surface's derivatives are the limits of its differences") {
     CHECK((p.dvv - (surface.at(u, v + h).dv - surface.at(u, v - h).dv) / (2 * h)).norm() < 1e-5);
     CHECK(std::abs(p.normal().dot(p.du)) < 1e-12);
   }
+}
+
+TEST_CASE("curves of any degree have the values and derivatives of the definition") {
+  samples::Numbers numbers;
+  for (int p : {1, 2, 3, 4, 6}) {
+    const auto curve = numbers.curve<2>(p, 7);
+    double first_net = 0;  // the largest control point of the derivative
+    for (std::size_t i = 1; i < curve.control.size(); ++i) {
+      const double run = curve.knots[i + p] - curve.knots[i];
+      first_net =
+          std::max(first_net, p / run * (curve.control[i] - curve.control[i - 1]).cwiseAbs().maxCoeff());
+    }
+    for (double t = 0; t <= 1; t += 0.0217) {
+      const CurvePoint2 at = curve.at(t);
+      for (int axis = 0; axis < 2; ++axis) {
+        CHECK(std::abs(at.value[axis] - samples::exact(curve, axis, t)) <= 8 * p * samples::eps);
+        CHECK(std::abs(curve.de_boor(t)[axis] - samples::exact(curve, axis, t)) <= 8 * p * samples::eps);
+        if (p > 1 && t > 0) {
+          CHECK(std::abs(at.first[axis] - samples::exact(curve, axis, t, 1)) <=
+                8 * p * samples::eps * first_net);
+        }
+      }
+    }
+    for (const auto& [t, end] : {std::pair{0, curve.control.front()}, {1, curve.control.back()}}) {
+      CHECK((curve.at(t).value - end).cwiseAbs().maxCoeff() <= 8 * p * samples::eps);
+      CHECK(curve.de_boor(t) == end);
+    }
+    CHECK(curve.at(-3).value == curve.at(0).value);
+  }
+}
+
+TEST_CASE("surfaces of any degree have the values and derivatives of the definition") {
+  samples::Numbers numbers;
+  for (const auto& [p, q] : {std::pair{3, 3}, {1, 1}, {2, 3}, {3, 4}, {5, 1}}) {
+    const BSplineSurface s = numbers.surface(p, 5, q, 4);
+    CHECK(check(s).has_value());
+    for (const auto& [u, v] : {std::pair{0.013, 0.93}, {0.41, 0.37}, {0.77, 0.5}, {0.999, 0.002}}) {
+      const SurfacePoint at = s.at(u, v);
+      const Eigen::MatrixXd* nets[3] = {&s.x, &s.y, &s.z};
+      // Every derivative's error is held against the same sum made of absolute values.
+      const auto bound = [&](int mu, int mv) {
+        double along_u = 0, along_v = 0;
+        for (int i = 0; i < s.control_u(); ++i)
+          along_u += static_cast<double>(samples::basis_derivative(s.knots_u, i, p, mu, u, 1));
+        for (int j = 0; j < s.control_v(); ++j)
+          along_v += static_cast<double>(samples::basis_derivative(s.knots_v, j, q, mv, v, 1));
+        return 8 * (p + q) * samples::eps * along_u * along_v;
+      };
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto exact = [&](int mu, int mv) { return samples::exact(s, *nets[axis], u, v, mu, mv); };
+        CHECK(std::abs(at.value[axis] - exact(0, 0)) <= 8 * (p + q) * samples::eps);
+        CHECK(std::abs(at.du[axis] - exact(1, 0)) <= bound(1, 0));
+        CHECK(std::abs(at.dv[axis] - exact(0, 1)) <= bound(0, 1));
+        CHECK(std::abs(at.duu[axis] - exact(2, 0)) <= bound(2, 0));
+        CHECK(std::abs(at.duv[axis] - exact(1, 1)) <= bound(1, 1));
+        CHECK(std::abs(at.dvv[axis] - exact(0, 2)) <= bound(0, 2));
+      }
+    }
+  }
+}
+
+TEST_CASE("the corners of a surface are those of its net") {
+  samples::Numbers numbers;
+  for (const BSplineSurface& s : {numbers.surface(3, 4, 3, 2), numbers.surface(2, 4, 4, 2)}) {
+    const int m = s.control_u() - 1, n = s.control_v() - 1;
+    for (const auto& [u, i] : {std::pair{0, 0}, {1, m}}) {
+      for (const auto& [v, j] : {std::pair{0, 0}, {1, n}}) {
+        const Eigen::Vector3d corner(s.x(i, j), s.y(i, j), s.z(i, j));
+        CHECK((s.at(u, v).value - corner).cwiseAbs().maxCoeff() <= 8 * 6 * samples::eps);
+        if (!s.bicubic()) CHECK(s.at(u, v).value == corner);
+      }
+    }
+  }
+}
+
+TEST_CASE("evaluation takes no memory") {
+  samples::Numbers numbers;
+  const BSplineSurface cubics = numbers.surface(3, 4, 3, 2), mixed = numbers.surface(2, 4, 4, 2);
+  const SpaceCurve curve = numbers.curve<3>(5, 3);
+  const std::size_t before = moldloft::test::allocations();
+  double sum = 0;
+  for (double t = 0; t < 1; t += 0.1)
+    sum +=
+        cubics.at(t, 1 - t).duv.x() + mixed.at(t, t).dvv.y() + curve.at(t).value.x() + curve.de_boor(t).z();
+  const std::size_t taken = moldloft::test::allocations() - before;
+  CHECK(taken == 0);
+  CHECK(std::isfinite(sum));
+}
+
+TEST_CASE("an affine map of the net is the affine map of the surface") {
+  samples::Numbers numbers;
+  const BSplineSurface s = numbers.surface(3, 5, 3, 3);
+  BSplineSurface moved = s;
+  moved.x = 0.5 * s.x - 2 * s.z + Eigen::MatrixXd::Constant(s.x.rows(), s.x.cols(), 3);
+  for (double u = 0; u <= 1; u += 0.11) {
+    const SurfacePoint a = s.at(u, 1 - u), b = moved.at(u, 1 - u);
+    CHECK(std::abs(b.value.x() - (0.5 * a.value.x() - 2 * a.value.z() + 3)) <= 2 * 48 * samples::eps * 5.5);
+    CHECK(b.value.y() == a.value.y());
+  }
+}
+
+TEST_CASE("a curve or surface from outside is checked with its control points") {
+  samples::Numbers numbers;
+  PlanCurve curve = numbers.curve<2>(3, 3);
+  CHECK(check(curve).has_value());
+  curve.control[2].y() = std::nan("");
+  CHECK(check(curve).error() == Error::not_finite);
+  curve.control.pop_back();
+  CHECK(check(curve).error() == Error::knots_wrong_count);
+  BSplineSurface s = numbers.surface(3, 2, 3, 2);
+  s.z.resize(3, 3);
+  CHECK(check(s).error() == Error::knots_wrong_count);
+  s = numbers.surface(3, 2, 3, 2);
+  s.y(1, 1) = std::numeric_limits<double>::infinity();
+  CHECK(check(s).error() == Error::not_finite);
+  s = numbers.surface(3, 2, 3, 2);
+  s.knots_v[4] = 2;
+  CHECK(check(s).error() == Error::knots_not_increasing);
 }
