@@ -70,6 +70,12 @@ Side cell_of(const BSplineSurface& surface, int first_u, int first_v) {
   return cell;
 }
 
+using CubicControl = Eigen::Matrix<double, 4, 3>;
+CubicControl piece_control(const Eigen::Matrix4d& along_t, const SpaceCurve& stripe, int first) {
+  const Eigen::Map<const Eigen::Matrix<double, 3, 4>> control(stripe.control[first].data());
+  return (control.lazyProduct(along_t)).transpose();
+}
+
 Eigen::Matrix<double, 16, 1> sample_row(const Eigen::Vector4d& along_u, const Eigen::Vector4d& along_v) {
   Eigen::Matrix<double, 16, 1> row;
   for (int i = 0; i < 4; ++i) row.segment<4>(4 * i) = along_u[i] * along_v;
@@ -109,7 +115,7 @@ void BSplineSurfaceFit::add_pieces(std::span<const StripeTrack> stripes, PieceWe
   CellGram cell(system_);
   for (std::size_t s = 0; s < stripes.size(); ++s) {
     const StripeTrack& stripe = stripes[s];
-    stripe_control_.push_back(static_cast<int>(stripe.knots.size()) - cubic - 1);
+    stripe_knots_.push_back(stripe.knots);
     cuts.clear();
     cut_stripe(stripe.preimage, stripe.knots, knots_u_, knots_v_, cuts);
     for (const StripePiece& cut : cuts) {
@@ -129,7 +135,7 @@ void BSplineSurfaceFit::add_samples(std::span<const SampledTrack> tracks) {
   CellGram cell(system_);
   for (std::size_t s = 0; s < tracks.size(); ++s) {
     const auto& [uv, weight] = tracks[s];
-    sample_count_.push_back(static_cast<int>(uv.size()));
+    sample_count_.push_back(uv.size());
     for (std::size_t n = 0; n < uv.size(); ++n) {
       const int span_u = find_span(knots_u_, uv[n].x()), span_v = find_span(knots_v_, uv[n].y());
       const double root = weight.empty() ? 1.0 : std::sqrt(weight[n]);
@@ -141,23 +147,27 @@ void BSplineSurfaceFit::add_samples(std::span<const SampledTrack> tracks) {
   }
 }
 
-std::expected<void, MatchingFailure> BSplineSurfaceFit::check_data(std::span<const Eigen::MatrixX3d> stripes,
-                                                                   std::span<const Eigen::MatrixX3d> samples,
+std::expected<void, MatchingFailure> BSplineSurfaceFit::check_data(std::span<const SpaceCurve> stripes,
+                                                                   std::span<const SampledPoints> samples,
                                                                    const BSplineSurface& base) const {
-  if (stripes.size() != stripe_control_.size() || samples.size() != sample_count_.size())
+  if (stripes.size() != stripe_knots_.size() || samples.size() != sample_count_.size())
     return std::unexpected(MatchingFailure{.what = Error::too_few_points});
+  const auto finite = [](const Eigen::Vector3d& point) { return point.allFinite(); };
   for (std::size_t s = 0; s < stripes.size(); ++s) {
+    const auto& [knots, control, degree] = stripes[s];
     const int stripe = static_cast<int>(s);
-    if (stripes[s].rows() != stripe_control_[s])
+    if (degree != cubic || knots != stripe_knots_[s])
+      return std::unexpected(MatchingFailure{.what = Error::curves_not_compatible, .stripe = stripe});
+    if (control.size() + cubic + 1 != knots.size())
       return std::unexpected(MatchingFailure{.what = Error::too_few_points, .stripe = stripe});
-    if (!stripes[s].allFinite())
+    if (!std::ranges::all_of(control, finite))
       return std::unexpected(MatchingFailure{.what = Error::not_finite, .stripe = stripe});
   }
   for (std::size_t s = 0; s < samples.size(); ++s) {
     const int stripe = static_cast<int>(stripes.size() + s);
-    if (samples[s].rows() != sample_count_[s])
+    if (samples[s].size() != sample_count_[s])
       return std::unexpected(MatchingFailure{.what = Error::too_few_points, .stripe = stripe});
-    if (!samples[s].allFinite())
+    if (!std::ranges::all_of(samples[s], finite))
       return std::unexpected(MatchingFailure{.what = Error::not_finite, .stripe = stripe});
   }
   if (system_.ring() == Ring::given) {
@@ -173,7 +183,7 @@ std::expected<void, MatchingFailure> BSplineSurfaceFit::check_data(std::span<con
 }
 
 std::expected<BSplineSurface, MatchingFailure> BSplineSurfaceFit::solve(
-    std::span<const Eigen::MatrixX3d> stripes, std::span<const Eigen::MatrixX3d> samples,
+    std::span<const SpaceCurve> stripes, std::span<const SampledPoints> samples,
     const BSplineSurface& base) const {
   if (const auto good = check_data(stripes, samples, base); !good) return std::unexpected(good.error());
 
@@ -191,8 +201,7 @@ std::expected<BSplineSurface, MatchingFailure> BSplineSurfaceFit::solve(
   Eigen::MatrixX3d side = Eigen::MatrixX3d::Zero(system_.size(), 3);
   for (const Piece& piece : pieces_) {
     const BicubicRows rows = bicubic_rows(piece.along_u, piece.along_v);
-    const Eigen::Matrix<double, 4, 3> control =
-        piece.along_t.transpose() * stripes[piece.stripe].middleRows<4>(piece.first_t);
+    const CubicControl control = piece_control(piece.along_t, stripes[piece.stripe], piece.first_t);
     SexticSide g = piece.root_weight * sextic_side(control);
     if (system_.touches_ring(piece.first_u, piece.first_v))
       g -= rows.transpose().lazyProduct(cell_of(surface, piece.first_u, piece.first_v));
@@ -200,7 +209,7 @@ std::expected<BSplineSurface, MatchingFailure> BSplineSurfaceFit::solve(
   }
   for (const Sample& sample : samples_) {
     const auto row = sample_row(sample.along_u, sample.along_v);
-    Eigen::RowVector3d g = sample.root_weight * samples[sample.track].row(sample.index);
+    Eigen::RowVector3d g = sample.root_weight * samples[sample.track][sample.index].transpose();
     if (system_.touches_ring(sample.first_u, sample.first_v))
       g -= row.transpose() * cell_of(surface, sample.first_u, sample.first_v);
     system_.add_side(sample.first_u, sample.first_v, row * g, side);
@@ -213,16 +222,15 @@ std::expected<BSplineSurface, MatchingFailure> BSplineSurfaceFit::solve(
   return surface;
 }
 
-MatchingResidual BSplineSurfaceFit::residual(std::span<const Eigen::MatrixX3d> stripes,
-                                             std::span<const Eigen::MatrixX3d> samples,
+MatchingResidual BSplineSurfaceFit::residual(std::span<const SpaceCurve> stripes,
+                                             std::span<const SampledPoints> samples,
                                              const BSplineSurface& surface) const {
   double sum = 0, most = 0;
   const auto take = [&](const Eigen::RowVector3d& miss) {
     sum += miss.squaredNorm(), most = std::max(most, miss.squaredNorm());
   };
   for (const Piece& piece : pieces_) {
-    const Eigen::Matrix<double, 4, 3> control =
-        piece.along_t.transpose() * stripes[piece.stripe].middleRows<4>(piece.first_t);
+    const CubicControl control = piece_control(piece.along_t, stripes[piece.stripe], piece.first_t);
     // Between Bernstein coefficients the difference stays within their hull: its largest bounds it everywhere.
     const SexticSide miss = bicubic_rows(piece.along_u, piece.along_v).transpose() *
                                 cell_of(surface, piece.first_u, piece.first_v) / piece.root_weight -
@@ -233,7 +241,7 @@ MatchingResidual BSplineSurfaceFit::residual(std::span<const Eigen::MatrixX3d> s
     if (sample.root_weight == 0) continue;
     take(sample_row(sample.along_u, sample.along_v).transpose() *
              cell_of(surface, sample.first_u, sample.first_v) / sample.root_weight -
-         samples[sample.track].row(sample.index));
+         samples[sample.track][sample.index].transpose());
   }
   const double equations = 7.0 * report_.pieces + report_.samples;
   return {std::sqrt(sum / equations), std::sqrt(most)};

@@ -3,7 +3,7 @@
 // points of its cell (thesis section 3.3, eq. 3.15-3.42). The matrix depends on the pre-images alone, so that the
 // same places measured again are solved on the stored factor. Points with (u, v) of their own may be mixed in.
 //
-// Shapes       surface control net: knots_u.size() - 4 by knots_v.size() - 4; stripe control points: knots.size() - 4
+// Shapes       surface control net: knots_u.size() - 4 by knots_v.size() - 4
 // Units        control points in mm in, mm out; (u, v), t and weights are plain numbers
 // Accuracy     the control points are the least squares solution within 4 half_band eps condition() of their size
 //              (Higham, Accuracy and Stability, theorem 10.4): a surface of these knots comes back from its own stripes
@@ -43,6 +43,8 @@ struct MatchingSettings {
   MatchingSystem::Ring ring = MatchingSystem::Ring::given;  // the boundary curves are interpolated
 };
 
+using SampledPoints = std::vector<Eigen::Vector3d>;
+
 struct MatchingReport {
   int pieces = 0, samples = 0, unknowns = 0;
   PivotReport pivot;
@@ -60,14 +62,14 @@ class BSplineSurfaceFit {
       std::vector<double> knots_u, std::vector<double> knots_v, std::span<const StripeTrack> stripes,
       std::span<const SampledTrack> samples = {}, const MatchingSettings& = {});
 
-  // Control points of every stripe and positions of every sampled track, in the order of assemble(). The outer ring
-  // of `base` (the Coons net of the boundary curves) is kept when the ring is given; else base is not looked at.
-  std::expected<BSplineSurface, MatchingFailure> solve(std::span<const Eigen::MatrixX3d> stripes,
-                                                       std::span<const Eigen::MatrixX3d> samples,
+  // The curve of every stripe and the points of every sampled track, in the order of assemble(). The outer ring of
+  // `base` (the Coons net of the boundary curves) is kept when the ring is given; else base is not looked at.
+  std::expected<BSplineSurface, MatchingFailure> solve(std::span<const SpaceCurve> stripes,
+                                                       std::span<const SampledPoints> samples,
                                                        const BSplineSurface& base) const;
 
-  MatchingResidual residual(std::span<const Eigen::MatrixX3d> stripes,
-                            std::span<const Eigen::MatrixX3d> samples, const BSplineSurface&) const;
+  MatchingResidual residual(std::span<const SpaceCurve> stripes,
+                            std::span<const SampledPoints> samples, const BSplineSurface&) const;
 
   // Of the normal equations, estimated (matching_system.hpp).
   double condition() const { return system_.condition(); }
@@ -92,12 +94,13 @@ class BSplineSurfaceFit {
   int control_v() const { return static_cast<int>(knots_v_.size()) - cubic - 1; }
   void add_pieces(std::span<const StripeTrack>, PieceWeight);
   void add_samples(std::span<const SampledTrack>);
-  std::expected<void, MatchingFailure> check_data(std::span<const Eigen::MatrixX3d> stripes,
-                                                  std::span<const Eigen::MatrixX3d> samples,
+  std::expected<void, MatchingFailure> check_data(std::span<const SpaceCurve> stripes,
+                                                  std::span<const SampledPoints> samples,
                                                   const BSplineSurface& base) const;
 
   std::vector<double> knots_u_, knots_v_;
-  std::vector<int> stripe_control_, sample_count_;  // how many of each are expected in solve()
+  std::vector<std::vector<double>> stripe_knots_;  // what solve() must be given
+  std::vector<std::size_t> sample_count_;
   std::vector<Piece> pieces_;
   std::vector<Sample> samples_;
   MatchingSystem system_;

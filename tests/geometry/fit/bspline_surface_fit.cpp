@@ -21,8 +21,15 @@ const std::vector<double> one_span = uniform_clamped_knots(1);
 
 struct Stripes {
   std::vector<StripeTrack> tracks;
-  std::vector<MatrixX3d> control;
+  std::vector<SpaceCurve> curves;
 };
+
+void add(Stripes& stripes, const std::vector<double>& knots, const Preimage& preimage, const MatrixX3d& control) {
+  stripes.tracks.push_back({knots, preimage});
+  SpaceCurve& curve = stripes.curves.emplace_back();
+  curve.knots = knots;
+  for (Eigen::Index i = 0; i < control.rows(); ++i) curve.control.emplace_back(control.row(i).transpose());
+}
 
 BSplineSurface random_surface(std::vector<double> u, std::vector<double> v, int seed = 1) {
   std::mt19937 random(seed);
@@ -50,10 +57,8 @@ void add_isoline(const BSplineSurface& surface, bool along_v, double at, Stripes
         control.col(axis) += basis[i] * nets[axis]->col(k - 3 + i);
     }
   }
-  stripes.control.push_back(control);
-  stripes.tracks.push_back(
-      {along_v ? surface.knots_v : surface.knots_u,
-       along_v ? straight_preimage({at, 0}, {at, 1}) : straight_preimage({0, at}, {1, at})});
+  add(stripes, along_v ? surface.knots_v : surface.knots_u,
+      along_v ? straight_preimage({at, 0}, {at, 1}) : straight_preimage({0, at}, {1, at}), control);
 }
 
 Stripes isolines(const BSplineSurface& surface, int count) {
@@ -71,9 +76,7 @@ Stripes random_stripes(int count, int seed) {
     const std::vector<double> knots = uniform_clamped_knots(1 + s % 4);
     const bool along_v = s % 2 == 0;
     const double from = unit(random), to = unit(random);
-    stripes.tracks.push_back(
-        {knots, along_v ? straight_preimage({from, 0}, {to, 1}) : straight_preimage({1, from}, {0, to})});
-    stripes.control.push_back(
+    add(stripes, knots, along_v ? straight_preimage({from, 0}, {to, 1}) : straight_preimage({1, from}, {0, to}),
         MatrixX3d::NullaryExpr(static_cast<int>(knots.size()) - 4, 3, [&] { return unit(random); }));
   }
   return stripes;
@@ -111,7 +114,7 @@ Equations dense_equations(const std::vector<double>& u, const std::vector<double
         for (int i = 0; i < 4; ++i) {
           for (int j = 0; j < 4; ++j)
             samples(n, (piece.span_u - 3 + i) * nv + piece.span_v - 3 + j) = bu[i] * bv[j];
-          points.row(n) += bt[i] * stripes.control[s].row(piece.stripe_span - 3 + i);
+          points.row(n) += bt[i] * stripes.curves[s].control[piece.stripe_span - 3 + i].transpose();
         }
       }
       const double root = weight == PieceWeight::length ? std::sqrt(piece.length()) : 1.0;
@@ -169,10 +172,10 @@ TEST_CASE("isolines of a surface give the surface back, whatever it is") {
       const Stripes stripes = isolines(truth, 16);
       const auto fit = BSplineSurfaceFit::assemble(uneven, even, stripes.tracks, {}, {weight, ring});
       REQUIRE(fit.has_value());
-      const auto surface = fit->solve(stripes.control, {}, truth);
+      const auto surface = fit->solve(stripes.curves, {}, truth);
       REQUIRE(surface.has_value());
       CHECK(net_distance(*surface, truth) < rounding_of(*fit));
-      CHECK(fit->residual(stripes.control, {}, *surface).max_mm < 1e-13);
+      CHECK(fit->residual(stripes.curves, {}, *surface).max_mm < 1e-13);
     }
   }
 }
@@ -184,7 +187,7 @@ TEST_CASE("the banded system has the dense matrix's least squares solution") {
     for (const Ring ring : {Ring::given, Ring::unknown}) {
       const auto fit = BSplineSurfaceFit::assemble(uneven, even, stripes.tracks, {}, {weight, ring});
       REQUIRE(fit.has_value());
-      const auto surface = fit->solve(stripes.control, {}, base);
+      const auto surface = fit->solve(stripes.curves, {}, base);
       REQUIRE(surface.has_value());
       const BSplineSurface dense =
           dense_fit(uneven, even, stripes, weight, ring == Ring::given ? &base : nullptr);
@@ -206,8 +209,8 @@ TEST_CASE("the next measuring phase is solved on the stored factor") {
   const auto fit = BSplineSurfaceFit::assemble(uneven, even, then.tracks);
   REQUIRE(fit.has_value());
   const double bound = rounding_of(*fit);
-  CHECK(net_distance(*fit->solve(now.control, {}, second), second) < bound);
-  CHECK(net_distance(*fit->solve(then.control, {}, first), first) < bound);
+  CHECK(net_distance(*fit->solve(now.curves, {}, second), second) < bound);
+  CHECK(net_distance(*fit->solve(then.curves, {}, first), first) < bound);
 }
 
 TEST_CASE("a stripe with a bent pre-image is matched on each of its straight parts") {
@@ -230,12 +233,11 @@ TEST_CASE("a stripe with a bent pre-image is matched on each of its straight par
       }
       control.middleRows<4>(3 * half) = values.partialPivLu().solve(points);
     }
-    stripes.tracks.push_back({knots, preimage});
-    stripes.control.push_back(control);
+    add(stripes, knots, preimage, control);
   }
   const auto fit = BSplineSurfaceFit::assemble(uneven, even, stripes.tracks, {}, {.ring = Ring::unknown});
   REQUIRE(fit.has_value());
-  const auto surface = fit->solve(stripes.control, {}, {});
+  const auto surface = fit->solve(stripes.curves, {}, {});
   REQUIRE(surface.has_value());
   for (double u = 0; u <= 1; u += 0.09)
     for (double v = 0; v <= 1; v += 0.07)
@@ -247,26 +249,26 @@ TEST_CASE("points with parameters of their own fill in where no stripe went") {
   Stripes stripes;
   for (const double at : {0.05, 0.1, 0.2, 0.3}) add_isoline(truth, true, at, stripes);
   SampledTrack track;
-  MatrixX3d points(400, 3);
+  SampledPoints points(400);
   std::mt19937 random(12);
   std::uniform_real_distribution<double> unit(0, 1);
   for (int n = 0; n < 400; ++n) {
     track.uv.emplace_back(unit(random), unit(random));
     track.weight.push_back(n % 10 == 0 ? 0.0 : 0.5 + unit(random));
-    points.row(n) = truth.at(track.uv[n].x(), track.uv[n].y()).value;
-    if (n % 10 == 0) points.row(n).array() += 100;  // of weight zero: must not be seen
+    points[n] = truth.at(track.uv[n].x(), track.uv[n].y()).value;
+    if (n % 10 == 0) points[n].array() += 100;  // of weight zero: must not be seen
   }
   const std::vector<SampledTrack> tracks{track};
-  const std::vector<MatrixX3d> data{points};
+  const std::vector<SampledPoints> data{points};
   CHECK(!BSplineSurfaceFit::assemble(uneven, even, stripes.tracks).has_value());
   for (const Ring ring : {Ring::given, Ring::unknown}) {
     const auto fit = BSplineSurfaceFit::assemble(uneven, even, stripes.tracks, tracks, {.ring = ring});
     REQUIRE(fit.has_value());
-    const auto surface = fit->solve(stripes.control, data, truth);
+    const auto surface = fit->solve(stripes.curves, data, truth);
     REQUIRE(surface.has_value());
     CHECK(net_distance(*surface, truth) < rounding_of(*fit));
     CHECK(fit->report().samples == 400);
-    CHECK(fit->residual(stripes.control, data, *surface).max_mm < rounding_of(*fit));
+    CHECK(fit->residual(stripes.curves, data, *surface).max_mm < rounding_of(*fit));
   }
 }
 
@@ -275,16 +277,12 @@ TEST_CASE("the residual bounds the distance of every point of every stripe") {
   const Stripes stripes = random_stripes(30, 13);
   const auto fit = BSplineSurfaceFit::assemble(uneven, even, stripes.tracks);
   REQUIRE(fit.has_value());
-  const auto surface = fit->solve(stripes.control, {}, base);
-  const double bound = fit->residual(stripes.control, {}, *surface).max_mm;
+  const auto surface = fit->solve(stripes.curves, {}, base);
+  const double bound = fit->residual(stripes.curves, {}, *surface).max_mm;
   double most = 0;
   for (std::size_t s = 0; s < stripes.tracks.size(); ++s) {
     for (double t = 0; t <= 1; t += 1.0 / 64) {
-      const auto& knots = stripes.tracks[s].knots;
-      const int k = find_span(knots, t);
-      const auto basis = cubic_basis(knots, k, t).value;
-      Vector3d point = Vector3d::Zero();
-      for (int i = 0; i < 4; ++i) point += basis[i] * stripes.control[s].row(k - 3 + i).transpose();
+      const Vector3d point = stripes.curves[s].at(t).value;
       const Vector2d uv = stripes.tracks[s].preimage.at(t);
       most = std::max(most, (surface->at(uv.x(), uv.y()).value - point).norm());
     }
@@ -379,13 +377,17 @@ TEST_CASE("a stripe that is wrong is named with what is wrong") {
 
   const auto fit = BSplineSurfaceFit::assemble(even, even, good.tracks);
   REQUIRE(fit.has_value());
-  auto data = good.control;
-  data[7](2, 1) = nan;
+  auto data = good.curves;
+  data[7].control[2].y() = nan;
   CHECK(fit->solve(data, {}, truth).error().what == Error::not_finite);
   CHECK(fit->solve(data, {}, truth).error().stripe == 7);
-  data[7].conservativeResize(3, 3);
+  data[7].control.pop_back();
   CHECK(fit->solve(data, {}, truth).error().what == Error::too_few_points);
+  data = good.curves;
+  data[6].knots[4] += 0.01;
+  CHECK(fit->solve(data, {}, truth).error().what == Error::curves_not_compatible);
+  CHECK(fit->solve(data, {}, truth).error().stripe == 6);
   data.pop_back();
   CHECK(fit->solve(data, {}, truth).error().what == Error::too_few_points);
-  CHECK(fit->solve(good.control, {}, random_surface(uneven, even)).error().what == Error::too_few_points);
+  CHECK(fit->solve(good.curves, {}, random_surface(uneven, even)).error().what == Error::too_few_points);
 }
