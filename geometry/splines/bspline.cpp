@@ -5,6 +5,8 @@
 #include <cassert>
 #include <cstring>
 
+#include "geometry/splines/tensor_point.hpp"
+
 namespace moldloft::geometry {
 
 namespace {
@@ -95,26 +97,8 @@ SurfacePoint any_degree_at(const BSplineSurface& s, int ku, double u, int kv, do
   BasisToSecond bu, bv;
   basis_derivatives(s.knots_u, s.degree_u, ku, u, 2, bu);
   basis_derivatives(s.knots_v, s.degree_v, kv, v, 2, bv);
-  const int wu = s.degree_u + 1, wv = s.degree_v + 1;
-  SurfacePoint point;
-  const Eigen::MatrixXd* nets[3] = {&s.x, &s.y, &s.z};
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::ptrdiff_t stride = nets[axis]->rows();
-    const double* patch = nets[axis]->data() + (ku - s.degree_u) + (kv - s.degree_v) * stride;
-    double value = 0, du = 0, dv = 0, duu = 0, duv = 0, dvv = 0;
-    for (int j = 0; j < wv; ++j) {
-      double row = 0, row_u = 0, row_uu = 0;
-      for (int i = 0; i < wu; ++i) {
-        const double p = patch[j * stride + i];
-        row += bu[i] * p, row_u += bu[wu + i] * p, row_uu += bu[2 * wu + i] * p;
-      }
-      value += bv[j] * row, du += bv[j] * row_u, duu += bv[j] * row_uu;
-      dv += bv[wv + j] * row, duv += bv[wv + j] * row_u, dvv += bv[2 * wv + j] * row;
-    }
-    point.value[axis] = value, point.du[axis] = du, point.dv[axis] = dv;
-    point.duu[axis] = duu, point.duv[axis] = duv, point.dvv[axis] = dvv;
-  }
-  return point;
+  const TensorBasis along_u{bu.data(), s.degree_u + 1}, along_v{bv.data(), s.degree_v + 1};
+  return tensor_point(along_u, along_v, s.x, s.y, s.z, ku - s.degree_u, kv - s.degree_v);
 }
 
 }  // namespace
