@@ -42,6 +42,14 @@ std::string_view to_string(Error error) noexcept {
       return "more data than the memory plan holds";
     case Error::not_on_plate:
       return "nothing was measured where the plate was expected";
+    case Error::too_few_stripes:
+      return "too few stripes for so many control points";
+    case Error::coincident_stripes:
+      return "two stripes lie on the same line of the surface";
+    case Error::no_length:
+      return "a stripe's pre-image has no length";
+    case Error::preimage_outside:
+      return "a stripe's pre-image leaves the surface's domain";
   }
   return "unknown error";
 }

@@ -25,6 +25,10 @@ enum class Error {
   curves_not_compatible,  // different knots or degrees where one set is asked for
   capacity,               // more data than the memory plan holds
   not_on_plate,           // the hint does not lie on anything that was measured
+  too_few_stripes,        // fewer equations than unknown control points
+  coincident_stripes,     // two stripes with one pre-image: they say the same, or contradict each other
+  no_length,              // a stripe whose pre-image begins where it ends
+  preimage_outside,       // a stripe whose pre-image leaves the surface's domain
 };
 
 std::string_view to_string(Error) noexcept;

@@ -1,0 +1,22 @@
+// What is wrong with stripes that should make a surface, and where: for a person to read, for a program to act on.
+#pragma once
+
+#include <string>
+
+#include "geometry/error.hpp"
+
+namespace moldloft::geometry {
+
+struct NetIndex {
+  int i = -1, j = -1;  // of a control point: along u, along v
+};
+
+struct MatchingFailure {
+  Error what;
+  int stripe = -1, other = -1;  // the stripe that is wrong, and the one that it coincides with
+  NetIndex control{};           // the control point that the stripes leave free
+};
+
+std::string describe(const MatchingFailure&);  // "what: stripe 3, which is where stripe 1 is"
+
+}  // namespace moldloft::geometry
