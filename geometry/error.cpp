@@ -24,6 +24,12 @@ std::string_view to_string(Error error) noexcept {
       return "more data than the memory plan holds";
     case Error::not_on_plate:
       return "nothing was measured where the plate was expected";
+    case Error::not_converged:
+      return "the iteration did not settle within its limit";
+    case Error::undetermined_pose:
+      return "the points leave a direction of the pose undetermined";
+    case Error::no_feasible_pose:
+      return "no pose keeps every point on its side of the surface";
   }
   return "unknown error";
 }

@@ -16,6 +16,9 @@ enum class Error {
   knots_not_increasing,
   capacity,      // more data than the memory plan holds
   not_on_plate,  // the hint does not lie on anything that was measured
+  not_converged,      // an iteration that reached its limit
+  undetermined_pose,  // a rigid motion that changes no distance
+  no_feasible_pose,   // constraints that contradict one another
 };
 
 std::string_view to_string(Error) noexcept;

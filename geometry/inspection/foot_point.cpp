@@ -12,8 +12,15 @@ using Eigen::Vector3d;
 
 constexpr int most_steps = 40;
 constexpr double certain_mm = 1e-6;  // what a box could hide at the most where the search lets it go
-constexpr double error_mm = 1e-13;   // of the last step, as far as the steps before foretell it
-constexpr double short_step_mm = 1e-4;
+
+// When a step is the last one.
+struct Enough {
+  double error_mm;       // of the place it leads to, as far as the steps before foretell it
+  double first_rate;     // how the error follows from a step where no step came before; 0: the span's own
+  double short_step_mm;  // longer ones are evaluated in any case
+};
+constexpr Enough exact{1e-13, 10, 1e-4};
+constexpr Enough by_distance{1e-6, 0, 0.02};
 
 struct Rectangle {
   double u0, u1, v0, v1;
@@ -105,10 +112,11 @@ inline double moved(double t, double step, double low, double high) {
 
 // Descends from (u, v) inside the rectangle. `span_of(u, v)` gives the polynomial that holds there.
 template <typename SpanOf>
-inline Place descend(const Lanes& p, double u, double v, const Rectangle& r, const SpanOf& span_of) {
+inline Place descend(const Lanes& p, double u, double v, const Rectangle& r, const Enough& enough,
+                     const SpanOf& span_of) {
   const SpanPolynomial* span = &span_of(u, v);
   Place place(u, v, slope_of(*span, p, u, v));
-  double before = 0;  // length of the previous step, mm
+  double before = 0;  // squared length of the previous step, mm^2
   while (place.steps < most_steps) {
     const Slope& s = place.slope;
     const double det = s.huu * s.hvv - s.huv * s.huv;
@@ -120,19 +128,20 @@ inline Place descend(const Lanes& p, double u, double v, const Rectangle& r, con
       // A trace of the diagonal keeps the matrix regular where the surface's directions fall together.
       least_of_model(s.a * (1 + 1e-9), s.b, s.c * (1 + 1e-9), s.gu, s.gv, place.u, place.v, r, du, dv);
     }
-    const double length = std::sqrt(std::max(0.0, s.a * du * du + 2 * s.b * du * dv + s.c * dv * dv));
-    if (length == 0) {
-      place.converged = true;
+    const double square = s.a * du * du + 2 * s.b * du * dv + s.c * dv * dv;
+    if (!(square > 0)) {
+      place.converged = square == 0;
       return place;
     }
     double next_u = moved(place.u, du, r.u0, r.u1), next_v = moved(place.v, dv, r.v0, r.v1);
     const SpanPolynomial* next_span = &span_of(next_u, next_v);
 
-    // Newton's steps shrink like rate * length^2: when the one after this would be below the accuracy, this
-    // one is taken on the expansion already at hand, which is good to length^3.
-    if (newton && next_span == span && length < short_step_mm) {
-      const double rate = before > 0 ? std::max(4 * length / (before * before), 1e-2) : 10.0;
-      if (rate * length * length < error_mm) {
+    // Newton's steps shrink like rate * length^2: when the one after this would be below the accuracy, this one is
+    // taken on the expansion already at hand, which is good to length^3.
+    if (newton && next_span == span && square < enough.short_step_mm * enough.short_step_mm) {
+      double rate = enough.first_rate > 0 ? enough.first_rate : 2 * span->newton_rate;
+      if (before > 0) rate = std::max(4 * std::sqrt(square) / before, 1e-2);
+      if (rate * square < enough.error_mm) {
         place.expand_to(next_u, next_v);
         place.converged = true;
         return place;
@@ -142,7 +151,7 @@ inline Place descend(const Lanes& p, double u, double v, const Rectangle& r, con
     Slope next = slope_of(*next_span, p, next_u, next_v);
     ++place.steps;
     // Of steps too short to be seen in the distance the equations alone can judge.
-    const bool unseen = newton && length < 1e-6;
+    const bool unseen = newton && square < 1e-12;
     double share = 1;
     while (!unseen && !(next.square <= s.square) && place.steps < most_steps) {
       share *= 0.5;
@@ -154,7 +163,7 @@ inline Place descend(const Lanes& p, double u, double v, const Rectangle& r, con
     if (!unseen && !(next.square <= s.square)) return place;  // a crease, or not a number
     place.step_to(next_u, next_v, next);
     span = next_span;
-    before = newton ? share * length : 0;
+    before = newton ? share * share * square : 0;
   }
   return place;
 }
@@ -202,7 +211,7 @@ class Search {
   NearestFoot run() {
     const Rectangle domain = domain_of(surface_);
     const Parameters guess = surface_.guess_of(p_);
-    take(descend(lanes_, guess.u, guess.v, domain,
+    take(descend(lanes_, guess.u, guess.v, domain, exact,
                  [&](double u, double v) -> const SpanPolynomial& { return surface_.span_at(u, v); }));
     visit(surface_.levels() - 1, 0, 0);
     NearestFoot nearest{foot_of(best_, lanes_, domain), 0, pieces_};
@@ -283,7 +292,7 @@ class Search {
     const double lowest = std::max(0.0, 2 * half_lowest);
     if (!worth_looking(lowest)) return;
     const Place place =
-        descend(lanes_, u, v, r, [&](double, double) -> const SpanPolynomial& { return span; });
+        descend(lanes_, u, v, r, exact, [&](double, double) -> const SpanPolynomial& { return span; });
     take(place);
     if (!place.converged) least_ = std::min(least_, lowest);
   }
@@ -295,7 +304,7 @@ class Search {
     if (bounds_of(net, r.u1 - r.u0, r.v1 - r.v0).convex_within(reach_here)) return solve_convex(span, r);
     const double middle_u = 0.5 * (r.u0 + r.u1), middle_v = 0.5 * (r.v0 + r.v1);
     if (depth == 0) {  // a descent from here makes the pieces that follow easier to leave alone
-      take(descend(lanes_, middle_u, middle_v, r,
+      take(descend(lanes_, middle_u, middle_v, r, exact,
                    [&](double, double) -> const SpanPolynomial& { return span; }));
     } else {
       take(Place(middle_u, middle_v, slope_of(span, lanes_, middle_u, middle_v)));
@@ -350,12 +359,14 @@ class Search {
 
 }  // namespace
 
-FootPoint foot_near(const PreparedSurface& surface, const Vector3d& p, double u, double v) {
+FootPoint foot_near(const PreparedSurface& surface, const Vector3d& p, double u, double v,
+                    FootAccuracy accuracy) {
   const Rectangle domain = domain_of(surface);
   const Lanes lanes = Lanes::of(p);
   u = u > domain.u0 ? std::min(u, domain.u1) : domain.u0;  // also where u is not a number
   v = v > domain.v0 ? std::min(v, domain.v1) : domain.v0;
-  const Place place = descend(lanes, u, v, domain, [&](double a, double b) -> const SpanPolynomial& {
+  const Enough& enough = accuracy == FootAccuracy::exact ? exact : by_distance;
+  const Place place = descend(lanes, u, v, domain, enough, [&](double a, double b) -> const SpanPolynomial& {
     return surface.span_at(a, b);
   });
   return foot_of(place, lanes, domain);

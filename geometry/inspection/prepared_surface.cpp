@@ -203,6 +203,9 @@ void PreparedSurface::bezier_net(int i, int j, BezierNet& net) const {
 
 void PreparedSurface::build_boxes() {
   levels_.push_back({0, along_u_.count(), along_v_.count()});
+  const auto ratio = [](double most, double least_square) {
+    return least_square > 0 ? most / least_square : std::numeric_limits<double>::infinity();
+  };
   bounds_.reserve(spans_.size());
   for (int i = 0; i < along_u_.count(); ++i) {
     for (int j = 0; j < along_v_.count(); ++j) {
@@ -211,6 +214,10 @@ void PreparedSurface::build_boxes() {
       boxes_.push_back(box_of(net));
       bounds_.push_back(bounds_of(net, along_u_.end_of(i) - along_u_.begin_of(i),
                                   along_v_.end_of(j) - along_v_.begin_of(j)));
+      const SpanBounds& b = bounds_.back();
+      spans_[index(i, j)].newton_rate =
+          1.5 * (ratio(b.most_duu, b.least_du2) + ratio(b.most_dvv, b.least_dv2)) +
+          3 * ratio(b.most_duv, std::sqrt(b.least_du2 * b.least_dv2));
     }
   }
   while (levels_.back().count_u > 1 || levels_.back().count_v > 1) {

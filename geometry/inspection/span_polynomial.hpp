@@ -47,10 +47,14 @@ struct SpanPolynomial {
   Lanes c[4][4];
   Lanes origin;
   double middle_u = 0, middle_v = 0;
+  // How fast Newton's steps to a foot on the span shrink at least: the next is about rate * length^2, in mm. From the
+  // first two derivatives; what curvature changes does at a distance is not in it.
+  double newton_rate = 0;
 
   SurfaceJet at(double u, double v) const {
     const double s = u - middle_u, t = v - middle_v;
     Lanes value[4], first[4], second[4];  // of the four cubics in s; `second` is half the second derivative
+#pragma GCC unroll 4
     for (int j = 0; j < 4; ++j) {
       const Lanes* p = c[j];
       const Lanes a2 = p[2] + s * p[3], a1 = p[1] + s * a2;
