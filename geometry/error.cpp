@@ -50,6 +50,12 @@ std::string_view to_string(Error error) noexcept {
       return "a stripe's pre-image has no length";
     case Error::preimage_outside:
       return "a stripe's pre-image leaves the surface's domain";
+    case Error::not_converged:
+      return "the iteration did not settle within its limit";
+    case Error::undetermined_pose:
+      return "the points leave a direction of the pose undetermined";
+    case Error::no_feasible_pose:
+      return "no pose keeps every point on its side of the surface";
   }
   return "unknown error";
 }

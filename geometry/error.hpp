@@ -29,6 +29,11 @@ enum class Error {
   coincident_stripes,     // two stripes with one pre-image: they say the same, or contradict each other
   no_length,              // a stripe whose pre-image begins where it ends
   preimage_outside,       // a stripe whose pre-image leaves the surface's domain
+  capacity,      // more data than the memory plan holds
+  not_on_plate,  // the hint does not lie on anything that was measured
+  not_converged,      // an iteration that reached its limit
+  undetermined_pose,  // a rigid motion that changes no distance
+  no_feasible_pose,   // constraints that contradict one another
 };
 
 std::string_view to_string(Error) noexcept;
