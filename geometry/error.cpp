@@ -24,6 +24,8 @@ std::string_view to_string(Error error) noexcept {
       return "more data than the memory plan holds";
     case Error::not_on_plate:
       return "nothing was measured where the plate was expected";
+    case Error::singular_parametrization:
+      return "the surface's parameter lines touch or stand still, so it has no tangent plane there";
   }
   return "unknown error";
 }
