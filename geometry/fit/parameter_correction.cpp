@@ -22,9 +22,14 @@ constexpr double damping_falls = 0.1, damping_grows = 4;
 constexpr double good_model = 0.5, poor_model = 0.1;  // achieved over promised reduction
 constexpr int settled_rounds = 3;
 
+// Smallest over largest pivot of the fit at given parameters, below which the data leave the net open somewhere: sixteen
+// stripes on eleven control points show 0.1, one stripe too few 1e-16.
+constexpr double determined = 1e-10;
+
 constexpr int foot_steps = 12;          // Newton: 2 or 3 beside the foot
 constexpr int foot_halvings = 12;       // of a step that overshoots
-constexpr double foot_reached = 1e-13;  // a step of the parameters that no longer matters
+constexpr double foot_reached = 1e-15;  // a step of the parameters that no longer matters
+constexpr double flat_share = 1e-8;  // of the squared distance: less of it along the surface is near the foot
 
 struct Domain {
   Vector2d low, high;
@@ -64,23 +69,33 @@ Vector2d newton_step(const SurfacePoint& at, const Foot& foot) {
   return {-(c * gu - b * gv) / det, -(a * gv - b * gu) / det};
 }
 
-// From `uv` to the foot of `point`; its distance never grows on the way.
+// How far the residual is from standing on the surface: its share along the free tangents, squared, mm^2.
+double slant(const Foot& foot) {
+  const double u = foot.free_u ? std::pow(foot.du.dot(foot.residual), 2) / foot.du.squaredNorm() : 0.0;
+  const double v = foot.free_v ? std::pow(foot.dv.dot(foot.residual), 2) / foot.dv.squaredNorm() : 0.0;
+  return u + v;
+}
+
+// From `uv` to the foot of `point`; its distance never grows on the way but by rounding.
 Foot settle(const BSplineSurface& surface, const Vector3d& point, const Vector2d& uv, const Domain& domain) {
   SurfacePoint at = surface.at(uv.x(), uv.y());
   Foot foot = see(at, point, uv, domain);
   for (int step = 0; step < foot_steps; ++step) {
     const Vector2d full = newton_step(at, foot);
     if (!full.allFinite()) break;
-    bool shorter = false;
+    // Near the foot the distance is flat and its fall drowns in rounding: there the slant tells whether to go on.
+    const bool near = slant(foot) <= flat_share * foot.squared;
+    bool better = false;
     double share = 1;
-    for (int halving = 0; halving < foot_halvings && !shorter; ++halving, share *= 0.5) {
+    for (int halving = 0; halving < (near ? 1 : foot_halvings) && !better; ++halving, share *= 0.5) {
       const Vector2d there = (foot.uv + share * full).cwiseMax(domain.low).cwiseMin(domain.high);
       if ((there - foot.uv).cwiseAbs().maxCoeff() <= foot_reached) return foot;
       const SurfacePoint next = surface.at(there.x(), there.y());
       const Foot moved = see(next, point, there, domain);
-      if (moved.squared < foot.squared) foot = moved, at = next, shorter = true;
+      better = near ? slant(moved) < slant(foot) : moved.squared < foot.squared;
+      if (better) foot = moved, at = next;
     }
-    if (!shorter) break;
+    if (!better) break;
   }
   return foot;
 }
@@ -157,14 +172,14 @@ class Correction {
   std::expected<CorrectedFit, Error> run(std::span<const Vector2d> parameters) {
     for (std::size_t k = 0; k < points_.size(); ++k) feet_[k].uv = parameters[k];
     see_all();
-    if (!refit()) return std::unexpected(Error::singular);
+    if (!first_fit()) return std::unexpected(Error::singular);
     CorrectionReport& report = fit_.report;
-    report.smallest_pivot = separate_.smallest_pivot(), report.largest_pivot = separate_.largest_pivot();
     see_all();
     report.start_rms_mm = rms();
     report.sums_mm2.push_back(sum_);
-    settle_all(fit_.surface, feet_);
-    sum_ = sum_of(feet_);
+    std::vector<Foot> feet = feet_;
+    settle_all(fit_.surface, feet);
+    if (const double sum = sum_of(feet); sum <= sum_) feet_ = std::move(feet), sum_ = sum;
     report.sums_mm2.push_back(sum_);
     report.end = settings_.step == CorrectionStep::tangent_distance ? tangent_rounds() : point_rounds();
 
@@ -197,12 +212,25 @@ class Correction {
     separate_.clear();
     for (const Foot& foot : feet_)
       separate_.add(live_basis(fit_.surface, foot.uv), Matrix3d::Identity(), foot.residual);
-    if (fairing_ < 0)  // the first time
-      fairing_ = settings_.fairing * separate_.trace() / separate_.fairing_trace(size_.x(), size_.y());
     if (fairing_ > 0) separate_.add_fairing(fairing_, size_.x(), size_.y(), fit_.surface);
     if (!separate_.solve()) return false;
     separate_.add_solution_to(fit_.surface);
     return true;
+  }
+
+  // The first fit: without fairing where the data determine the net by themselves.
+  bool first_fit() {
+    const BSplineSurface before = fit_.surface;
+    fairing_ = 0;
+    const bool solved = refit();
+    fit_.report.smallest_pivot = solved ? separate_.smallest_pivot() : 0.0;
+    fit_.report.largest_pivot = separate_.largest_pivot();
+    if (solved && separate_.smallest_pivot() >= determined * separate_.largest_pivot()) return true;
+    if (!(settings_.fairing > 0)) return false;
+    fit_.surface = before;
+    fit_.report.faired = true;
+    fairing_ = settings_.fairing * separate_.trace() / separate_.fairing_trace(size_.x(), size_.y());
+    return refit();
   }
 
   bool close_enough() const { return sum_ <= settings_.enough_mm * settings_.enough_mm * points_.size(); }
@@ -292,7 +320,7 @@ class Correction {
   CorrectedFit fit_;
   std::vector<Foot> feet_;
   double sum_ = 0;
-  double fairing_ = -1;  // its factor, once known
+  double fairing_ = 0;  // the energy's factor; none where the data determine the net
   int quiet_ = 0;
 };
 
