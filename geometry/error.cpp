@@ -56,6 +56,8 @@ std::string_view to_string(Error error) noexcept {
       return "the points leave a direction of the pose undetermined";
     case Error::no_feasible_pose:
       return "no pose keeps every point on its side of the surface";
+    case Error::singular_parametrization:
+      return "the surface's parameter lines touch or stand still, so it has no tangent plane there";
   }
   return "unknown error";
 }

@@ -34,6 +34,7 @@ enum class Error {
   not_converged,      // an iteration that reached its limit
   undetermined_pose,  // a rigid motion that changes no distance
   no_feasible_pose,   // constraints that contradict one another
+  singular_parametrization,  // r_u x r_v vanishes: the surface has no tangent plane in this parametrization
 };
 
 std::string_view to_string(Error) noexcept;
