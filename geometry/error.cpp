@@ -24,6 +24,14 @@ std::string_view to_string(Error error) noexcept {
       return "more data than the memory plan holds";
     case Error::not_on_plate:
       return "nothing was measured where the plate was expected";
+    case Error::self_crossing:
+      return "an outline crosses itself or another";
+    case Error::open_loop:
+      return "the curves of an outline do not meet end to end";
+    case Error::wrong_way_round:
+      return "an outline runs the wrong way round its face";
+    case Error::off_surface:
+      return "a curve does not lie on the surface it bounds";
   }
   return "unknown error";
 }

@@ -16,6 +16,10 @@ enum class Error {
   knots_not_increasing,
   capacity,      // more data than the memory plan holds
   not_on_plate,  // the hint does not lie on anything that was measured
+  self_crossing,    // an outline or a loop of trim curves touches itself or another
+  open_loop,        // curves that should meet end to end do not
+  wrong_way_round,  // a loop that has the face on its right
+  off_surface,      // a curve that should lie on the surface does not
 };
 
 std::string_view to_string(Error) noexcept;
