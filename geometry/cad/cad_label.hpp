@@ -13,12 +13,12 @@ struct CadStamp {  // UTC
 };
 
 struct CadLabel {
-  std::string name = "plate";  // of the product
-  std::string description;     // one line: what it is and how exact
-  std::string file_name;       // as the file is called, without its folder
+  std::string name = "plate";    // of the product
+  std::string description = {};  // one line: what it is and how exact
+  std::string file_name = {};    // as the file is called, without its folder
   std::string system = "Moldloft";
-  std::string author, organization;
-  CadStamp stamp;
+  std::string author = {}, organization = {};
+  CadStamp stamp = {};
   // How far edges, corners and surface may lie apart and still be one: the uncertainty that the file states, and the
   // bound on the space curves of trims. It says nothing of how well the plate was measured. The default is the
   // resolution of the common modelling kernels (1e-8 m).

@@ -27,9 +27,9 @@ struct SpaceCurve {  // a cubic B-spline curve in space, mm
 };
 
 struct TrimCurve {
-  PlanCurve path;                   // (u, v)
-  std::optional<SpaceCurve> image;  // surface(path), where it is known
-  bool reversed = false;            // the loop walks the path from its end to its start
+  PlanCurve path;                        // (u, v)
+  std::optional<SpaceCurve> image = {};  // surface(path), where it is known
+  bool reversed = false;                 // the loop walks the path from its end to its start
 };
 using TrimLoop = std::vector<TrimCurve>;
 
