@@ -12,7 +12,8 @@ namespace {
 
 constexpr std::size_t line_width = 80;
 
-// Breaks a statement after commas; never inside a string, where a line's end would be lost.
+// Breaks a statement after commas, and between the parts of a complex instance; never inside a string, where a line's
+// end would be lost.
 void append_wrapped(std::string& out, std::string_view statement) {
   std::size_t line_start = 0, last_break = 0;
   bool quoted = false;
@@ -23,7 +24,9 @@ void append_wrapped(std::string& out, std::string_view statement) {
       out += '\n';
       line_start = last_break;
     }
-    if (statement[i] == ',' && !quoted) last_break = i + 1;
+    const bool part_ends =
+        statement[i] == ')' && i + 1 < statement.size() && statement[i + 1] >= 'A' && statement[i + 1] <= 'Z';
+    if (!quoted && (statement[i] == ',' || part_ends)) last_break = i + 1;
   }
   out += statement.substr(line_start);
   out += '\n';
