@@ -58,6 +58,14 @@ std::string_view to_string(Error error) noexcept {
       return "no pose keeps every point on its side of the surface";
     case Error::singular_parametrization:
       return "the surface's parameter lines touch or stand still, so it has no tangent plane there";
+    case Error::self_crossing:
+      return "an outline crosses itself or another";
+    case Error::open_loop:
+      return "the curves of an outline do not meet end to end";
+    case Error::wrong_way_round:
+      return "an outline runs the wrong way round its face";
+    case Error::off_surface:
+      return "a curve does not lie on the surface it bounds";
   }
   return "unknown error";
 }

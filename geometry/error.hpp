@@ -35,6 +35,10 @@ enum class Error {
   undetermined_pose,  // a rigid motion that changes no distance
   no_feasible_pose,   // constraints that contradict one another
   singular_parametrization,  // r_u x r_v vanishes: the surface has no tangent plane in this parametrization
+  self_crossing,    // an outline or a loop of trim curves touches itself or another
+  open_loop,        // curves that should meet end to end do not
+  wrong_way_round,  // a loop that has the face on its right
+  off_surface,      // a curve that should lie on the surface does not
 };
 
 std::string_view to_string(Error) noexcept;
