@@ -1,58 +1,80 @@
-// What the surface fit keeps of its points: per cell of a net 7 x 7 sums of B6 B6 and 4 x 4 sums of z B3 B3.
-// They are all that least squares with bicubic splines over these cells needs (field notes, "Bernstein
-// moments"), and the moments of a coarser net follow from them exactly.
+// What the surface fit keeps of its points: per cell of a net 7 x 7 sums of B6 B6 and 4 x 4 sums of z B3 B3. They
+// are all that least squares with bicubic splines over these cells needs (field notes, "Bernstein moments"), and the
+// moments of a coarser net follow from them exactly. A row of the 7 x 7 carries an eighth sum, w z^2 B6_p, so that
+// the squares of the heights are known cell by cell too.
 //
-// Cost         add: 49 + 16 multiply-adds; merge of 2 x 2 cells: 3,000
+// Cost         add: 56 + 16 multiply-adds (the plain form; moment_kernel.hpp has the fast one); merge: moment_kernel.hpp
 // Allocation   in the constructor only
 #pragma once
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "geometry/splines/bernstein.hpp"
 
 namespace moldloft::geometry {
 
-struct CellMoments {
-  std::array<double, 49> gram;  // [p * 7 + q]: sum of w B6_p(s) B6_q(t)
+struct alignas(64) CellMoments {
+  std::array<double, 56> gram;  // [p * 8 + q]: sum of w B6_p(s) B6_q(t); q = 7: of w B6_p(s) z^2
   std::array<double, 16> load;  // [i * 4 + j]: sum of w z B3_i(s) B3_j(t)
 
   void add(const BernsteinValues& s, const BernsteinValues& t, double z, double weight) {
     for (int p = 0; p < 7; ++p) {
       const double row = weight * s.sextic[p];
-      for (int q = 0; q < 7; ++q) gram[p * 7 + q] += row * t.sextic[q];
+      for (int q = 0; q < 7; ++q) gram[p * 8 + q] += row * t.sextic[q];
+      gram[p * 8 + 7] += row * (z * z);
     }
     for (int i = 0; i < 4; ++i) {
       const double row = weight * z * s.cubic[i];
       for (int j = 0; j < 4; ++j) load[i * 4 + j] += row * t.cubic[j];
     }
   }
-  double weight() const {  // the sextics sum to one
+  // The sextics sum to one.
+  double weight() const {
     double sum = 0;
-    for (const double m : gram) sum += m;
+    for (int p = 0; p < 7; ++p) {
+      for (int q = 0; q < 7; ++q) sum += gram[p * 8 + q];
+    }
+    return sum;
+  }
+  double squares() const {
+    double sum = 0;
+    for (int p = 0; p < 7; ++p) sum += gram[p * 8 + 7];
     return sum;
   }
 };
 
 class MomentGrid {
  public:
-  MomentGrid(int cells_u, int cells_v) : cells_u_(cells_u), cells_v_(cells_v), cells_(cells_u * cells_v) {}
+  MomentGrid(int cells_u, int cells_v)
+      : cells_u_(cells_u), cells_v_(cells_v), cells_(cells_u * cells_v), counts_(cells_u * cells_v) {}
 
   int cells_u() const { return cells_u_; }
   int cells_v() const { return cells_v_; }
   CellMoments& cell(int i, int j) { return cells_[i * cells_v_ + j]; }
   const CellMoments& cell(int i, int j) const { return cells_[i * cells_v_ + j]; }
+  std::uint32_t& points(int i, int j) { return counts_[i * cells_v_ + j]; }
+  std::uint32_t points(int i, int j) const { return counts_[i * cells_v_ + j]; }
+  CellMoments* cells() { return cells_.data(); }
+  std::uint32_t* counts() { return counts_.data(); }
   void clear();
 
   // Fills row i of this grid from `fine`, whose cells are halves of this grid's cells in u, in v, or in both.
   void merge_row(int i, const MomentGrid& fine);
+  // Another grid's sums, same cells. What is taken away must have been added before.
+  void add(const MomentGrid& other);
+  void subtract(const MomentGrid& other);
 
-  std::size_t bytes() const { return cells_.capacity() * sizeof(CellMoments); }
+  std::size_t bytes() const {
+    return cells_.capacity() * sizeof(CellMoments) + counts_.capacity() * sizeof(std::uint32_t);
+  }
 
  private:
   int cells_u_, cells_v_;
   std::vector<CellMoments> cells_;
+  std::vector<std::uint32_t> counts_;
 };
 
 // out[p][q] += sum_lm Ru[p][l] in[l][m] Rv[q][m]: a cell's sums, taken over as part of a larger cell.

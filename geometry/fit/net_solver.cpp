@@ -1,47 +1,53 @@
 #include "geometry/fit/net_solver.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 namespace moldloft::geometry {
 
 namespace {
 
-constexpr double work_a_piece = 150'000;  // multiply-adds: some 100 us on the slowest machine that we know
-
 // A pivot below this share of the largest is rounding, not data.
 constexpr double pivot_floor = 1e-15;
+
+// Multiply-adds, about, of the pieces that do not depend on the net's size.
+constexpr double gram_cost = 2000, load_cost = 190, fairing_cost = 700;
 
 using ConstVector = Eigen::Map<const Eigen::VectorXd>;
 
 }  // namespace
 
 NetSolver::NetSolver(std::size_t max_unknowns, std::size_t max_half_band)
-    : matrix_(max_unknowns, max_half_band), right_(max_unknowns), data_diagonal_(max_unknowns) {}
+    : matrix_(max_unknowns, max_half_band),
+      right_(max_unknowns),
+      data_diagonal_(max_unknowns),
+      column_sums_(max_unknowns) {}
 
 std::size_t NetSolver::bytes() const {
-  return matrix_.bytes() + (right_.capacity() + data_diagonal_.capacity()) * sizeof(double);
+  return matrix_.bytes() +
+         (right_.capacity() + data_diagonal_.capacity() + column_sums_.capacity()) * sizeof(double);
 }
 
 void NetSolver::start(const NetTask& task, ShotOffsets* shots) {
   task_ = task;
   shots_ = task.shot_sigma_mm > 0 && shots != nullptr && shots->count() > 0 ? shots : nullptr;
+  assert(shots_ == nullptr || task.boundary.empty());
+  assert(task.boundary.empty() || static_cast<int>(task.boundary.size()) == size());
   result_ = {};
   result_.point_sigma_mm = task.point_sigma_mm;
   matrix_.reset(size(), task.net->half_band());
-  trace_data_ = trace_fairing_ = 0;
-  cursor_ = column_ = 0;
+  trace_data_ = objective_ = border_squares_ = norm_one_ = 0;
+  cursor_ = column_ = row_ = 0;
   phase_ = Phase::clear;
 }
 
-int NetSolver::slice(double cost_of_one) const {
-  return std::max(1, static_cast<int>(work_a_piece / cost_of_one));
-}
-
 template <typename Piece>
-bool NetSolver::advance(int end, double cost_of_one, Piece&& piece) {
-  const int to = std::min(end, cursor_ + slice(cost_of_one));
+bool NetSolver::advance(int end, double cost_of_one, Piece&& piece, int grain) {
+  const int room = static_cast<int>((work_a_step - work_) / cost_of_one) / grain * grain;
+  const int to = std::min(end, cursor_ + std::max(grain, room));
   piece(cursor_, to);
+  work_ += (to - cursor_) * cost_of_one;
   cursor_ = to;
   if (cursor_ < end) return false;
   cursor_ = 0;
@@ -52,46 +58,88 @@ void NetSolver::add_data_row(int row) {
   const SplineNet& net = *task_.net;
   for (int j = 0; j < task_.moments->cells_v(); ++j) {
     const CellMoments& moments = task_.moments->cell(row, j);
-    const CellMatrix fairing = net.fairing(row, j, task_.length_u_mm, task_.length_v_mm);
-    for (int k = 0; k < 16; ++k) trace_fairing_ += fairing[k][k];
-    if (!(moments.weight() > 0)) {
-      ++result_.empty_cells;
-      continue;
-    }
+    const std::uint32_t points = task_.moments->points(row, j);
+    result_.empty_cells += points == 0;
+    result_.sparse_cells += points > 0 && points < task_.sparse_points;
+    if (points == 0) continue;
     const CellMatrix gram = net.gram(row, j, moments);
-    CellVector diagonal;
-    for (int k = 0; k < 16; ++k) trace_data_ += diagonal[k] = gram[k][k];
+    trace_data_ += SplineNet::trace(gram);
     net.add_to(matrix_, row, j, gram, 1.0);
-    net.add_to(data_diagonal_, row, j, diagonal);
+    net.add_diagonal_to(data_diagonal_, row, j, gram);
     net.add_to(right_, row, j, net.load(row, j, moments.load));
   }
 }
 
-void NetSolver::add_fairing_row(int row) {
+void NetSolver::add_sparse_fairing_row(int row) {
   for (int j = 0; j < task_.moments->cells_v(); ++j) {
+    if (task_.moments->points(row, j) >= task_.sparse_points) continue;
     task_.net->add_to(matrix_, row, j, task_.net->fairing(row, j, task_.length_u_mm, task_.length_v_mm),
-                      fairing_);
+                      sparse_fairing_);
   }
 }
 
-// The minimum of the objective holds the fairing's energy; the residual is what is left without it.
-void NetSolver::subtract_fairing_energy(int row) {
+void NetSolver::subtract_sparse_energy(int row) {
   for (int j = 0; j < task_.moments->cells_v(); ++j) {
+    if (task_.moments->points(row, j) >= task_.sparse_points) continue;
     const CellMatrix fairing = task_.net->fairing(row, j, task_.length_u_mm, task_.length_v_mm);
-    const CellVector c = task_.net->gather(right_, row, j);
-    double energy = 0;
-    for (int k = 0; k < 16; ++k) {
-      for (int l = 0; l < 16; ++l) energy += c[k] * fairing[k][l] * c[l];
-    }
-    objective_ -= fairing_ * energy;
+    objective_ -= sparse_fairing_ * task_.net->energy(row, j, fairing, right_);
   }
 }
 
-void NetSolver::estimate_noise() {
+bool NetSolver::on_border(int unknown) const {
+  const SplineNet& net = *task_.net;
+  const int fast = net.v_is_fast() ? net.control_v() : net.control_u();
+  const int slow = size() / fast, i = unknown / fast, j = unknown % fast;
+  return i == 0 || j == 0 || i == slow - 1 || j == fast - 1;
+}
+
+// The ring is taken out of the equations in place, so that the band keeps its shape: its rows and columns become those of
+// a diagonal matrix whose solution is the value given.
+void NetSolver::add_border() {
+  const int n = size(), band = matrix_.half_band();
+  const double typical = trace_data_ / n;
+  for (int k = 0; k < n; ++k) {
+    if (!on_border(k)) continue;
+    const double g = task_.boundary[k];
+    if (std::isfinite(task_.boundary_weight)) {
+      matrix_.entry(k, k) += task_.boundary_weight;
+      right_[k] += task_.boundary_weight * g;
+      border_squares_ += task_.boundary_weight * g * g;
+      continue;
+    }
+    border_squares_ -= 2 * right_[k] * g;
+    const auto eliminate = [&](double& entry, int other) {
+      right_[other] -= entry * g;
+      entry = 0;
+    };
+    for (int j = std::max(0, k - band); j < k; ++j) eliminate(matrix_.entry(k, j), j);
+    border_squares_ += matrix_.entry(k, k) * g * g;
+    for (int i = k + 1; i <= std::min(n - 1, k + band); ++i) eliminate(matrix_.entry(i, k), i);
+    matrix_.entry(k, k) = typical;
+    right_[k] = typical * g;
+    border_squares_ += typical * g * g;  // what y'y will take for it
+  }
+}
+
+void NetSolver::take_norm(int first, int end) {
+  for (int j = first; j < end; ++j) {
+    column_sums_[j] += std::abs(matrix_.entry(j, j));
+    for (int i = j + 1; i <= std::min(size() - 1, j + matrix_.half_band()); ++i) {
+      const double size_of_entry = std::abs(matrix_.entry(i, j));
+      column_sums_[j] += size_of_entry, column_sums_[i] += size_of_entry;
+    }
+  }
+}
+
+void NetSolver::estimate_noise(double y_squared) {
   const double typical = trace_data_ / size();
-  result_.freedom = static_cast<double>(std::count_if(data_diagonal_.begin(), data_diagonal_.begin() + size(),
-                                                      [&](double d) { return d > 1e-9 * typical; }));
-  objective_ = task_.totals.squares - ConstVector(right_.data(), size()).squaredNorm();
+  int determined = 0, given = 0;
+  for (int k = 0; k < size(); ++k) {
+    determined += data_diagonal_[k] > 1e-9 * typical;
+    given += !task_.boundary.empty() && std::isinf(task_.boundary_weight) && on_border(k);
+  }
+  result_.freedom = std::max(1, determined - given);
+  objective_ = task_.totals.squares + border_squares_ - y_squared;
   const double free = std::max(1.0, static_cast<double>(task_.totals.points) - result_.freedom);
   const double sigma = std::sqrt(std::max(objective_, 0.0) / free);
   if (result_.point_sigma_mm <= 0) result_.point_sigma_mm = sigma;
@@ -116,109 +164,186 @@ void NetSolver::take_offsets() {
   result_.freedom += n;
 }
 
-std::expected<bool, Error> NetSolver::step() {
-  const int n = size(), rows = task_.moments->cells_u(), cells = task_.moments->cells_v();
+// The minimum of the objective holds the energy of fairing and border; the residual is what is left without them.
+void NetSolver::finish() {
+  if (!task_.boundary.empty() && std::isfinite(task_.boundary_weight)) {
+    for (int k = 0; k < size(); ++k) {
+      if (on_border(k)) objective_ -= task_.boundary_weight * std::pow(right_[k] - task_.boundary[k], 2);
+    }
+  }
+  result_.squares = std::max(objective_, 0.0);
+}
+
+template <typename Piece>
+bool NetSolver::each_shot(double cost_of_cell, Piece&& piece) {
+  while (cursor_ < shots_->count()) {
+    const double cost = 30 + cost_of_cell * static_cast<double>(shots_->cells_of(cursor_));
+    if (work_ > 0 && work_ + cost > work_a_step) return false;
+    piece(cursor_++);
+    work_ += cost;
+  }
+  cursor_ = 0;
+  return true;
+}
+
+bool NetSolver::step_shots() {
+  const int n = size();
   const double band = task_.net->half_band();
+  ShotOffsets& shots = *shots_;
+  switch (phase_) {
+    case Phase::touch:
+      if (each_shot(30, [&](int slot) { shots.touch(slot, *task_.net); })) {
+        shots.start(*task_.net);
+        phase_ = Phase::columns;
+      }
+      return true;
+    case Phase::columns:
+      if (advance(n, shots.row_length(), [&](int a, int b) {
+            shots.clear_rows(a, b);
+            for (; a < b; ++a) shots.set_y(a, right_[a]);
+          })) {
+        phase_ = Phase::scatter;
+      }
+      return true;
+    case Phase::scatter:
+      if (each_shot(load_cost, [&](int slot) { shots.scatter(slot, *task_.net); })) {
+        phase_ = Phase::lower, column_ = 0, cursor_ = shots.first_row(0);
+      }
+      return true;
+    case Phase::lower:
+      if (advance(n, 8 * band, [&](int a, int b) {
+            matrix_.solve_lower_many(shots.columns(), shots.row_length(), 8 * column_, 8, a, b);
+          }, band_panel)) {
+        if (++column_ == shots.groups()) {
+          phase_ = Phase::form, column_ = row_ = 0;
+        }
+        cursor_ = shots.first_row(column_ % shots.groups());
+      }
+      return true;
+    case Phase::form:
+      if (advance(n, 64, [&](int a, int b) { shots.form(matrix_.kernel(), row_, column_, a, b); })) {
+        if (++column_ > row_) ++row_, column_ = 0;
+        if (row_ < shots.groups()) {
+          cursor_ = shots.first_row(row_);
+        } else {
+          estimate_noise(shots.y_squared());
+          phase_ = Phase::schur, column_ = 0;
+        }
+      }
+      return true;
+    case Phase::schur:
+      if (!shots.factor_row(column_, rho_)) return false;
+      work_ += 0.5 * column_ * column_ + 50 * column_;
+      if (++column_ == shots.count()) {
+        take_offsets();
+        work_ += 2.0 * column_ * column_;
+        phase_ = Phase::offsets, column_ = 0;
+      }
+      return true;
+    default:
+      // y - W d, and on the way y'(y - W d), in slices of rows.
+      if (advance(n, shots.row_length(), [&](int a, int b) {
+            double before_after = 0;
+            for (int i = a; i < b; ++i) {
+              right_[i] = shots.moved(i);
+              before_after += shots.y(i) * right_[i];
+            }
+            objective_ -= before_after;
+          })) {
+        phase_ = Phase::backward;
+      }
+      return true;
+  }
+}
+
+std::expected<bool, Error> NetSolver::step() {
+  const SplineNet& net = *task_.net;
+  const int n = size(), rows = task_.moments->cells_u(), cells = task_.moments->cells_v();
+  const double band = net.half_band();
+  work_ = 0;
   switch (phase_) {
     case Phase::clear:
       if (advance(n, band + 3, [&](int a, int b) {
             matrix_.clear(a, b);
             std::fill(right_.begin() + a, right_.begin() + b, 0.0);
             std::fill(data_diagonal_.begin() + a, data_diagonal_.begin() + b, 0.0);
+            std::fill(column_sums_.begin() + a, column_sums_.begin() + b, 0.0);
           })) {
         phase_ = Phase::data;
       }
       return false;
     case Phase::data:
-      if (advance(rows, 4000.0 * cells, [&](int a, int b) {
+      if (advance(rows, gram_cost * cells, [&](int a, int b) {
             for (; a < b; ++a) add_data_row(a);
           })) {
-        fairing_ = task_.fairing * trace_data_ / trace_fairing_;
+        const double ratio = trace_data_ / net.fairing_trace(task_.length_u_mm, task_.length_v_mm);
+        fairing_ = task_.fairing * ratio, sparse_fairing_ = task_.sparse_fairing * ratio;
         phase_ = Phase::fair;
       }
       return false;
     case Phase::fair:
-      if (advance(rows, 3000.0 * cells, [&](int a, int b) {
-            for (; a < b; ++a) add_fairing_row(a);
+      if (fairing_ <= 0 || advance(net.slow_rows(), 100.0 * n / net.slow_rows(), [&](int a, int b) {
+            net.add_fairing(matrix_, a, b, task_.length_u_mm, task_.length_v_mm, fairing_);
           })) {
+        phase_ = Phase::border;
+      }
+      return false;
+    case Phase::border:
+      if (sparse_fairing_ <= 0 || advance(rows, fairing_cost * cells, [&](int a, int b) {
+            for (; a < b; ++a) add_sparse_fairing_row(a);
+          })) {
+        if (!task_.boundary.empty()) add_border(), work_ += 2 * band * 4 * std::sqrt(n);
+        phase_ = norm_wanted_ ? Phase::norm : Phase::factor;
+      }
+      return false;
+    case Phase::norm:
+      if (advance(n, 2 * band, [&](int a, int b) { take_norm(a, b); })) {
+        norm_one_ = *std::max_element(column_sums_.begin(), column_sums_.begin() + n);
         phase_ = Phase::factor;
       }
       return false;
     case Phase::factor: {
       bool positive = true;
       const bool finished =
-          advance(n, 0.5 * band * band, [&](int a, int b) { positive = matrix_.factor(a, b); });
+          advance(n, 0.5 * band * (band + 8), [&](int a, int b) { positive = matrix_.factor(a, b); }, band_panel);
       if (!positive) return std::unexpected(Error::singular);
       if (!finished) return false;
       result_.smallest_pivot = matrix_.smallest_pivot() / matrix_.largest_pivot();
+      result_.smallest_pivot_unknown = matrix_.smallest_column();
       if (!(result_.smallest_pivot > pivot_floor)) return std::unexpected(Error::singular);
-      phase_ = Phase::forward;
+      phase_ = shots_ ? Phase::touch : Phase::forward;
       return false;
     }
     case Phase::forward:
       if (advance(n, band, [&](int a, int b) { matrix_.solve_lower(right_, a, b); })) {
-        estimate_noise();
-        phase_ = shots_ ? Phase::columns : Phase::backward;
-        if (shots_) shots_->start(n);
-      }
-      return false;
-    case Phase::columns:
-      if (advance(shots_->count(), n, [&](int a, int b) {
-            for (; a < b; ++a) std::ranges::fill(shots_->column(a), 0.0);
-          })) {
-        phase_ = Phase::scatter;
-      }
-      return false;
-    case Phase::scatter:
-      if (advance(static_cast<int>(shots_->shot_cells()), 1000,
-                  [&](int a, int b) { shots_->scatter(*task_.net, rows, cells, a, b); })) {
-        phase_ = Phase::lower, column_ = 0;
-      }
-      return false;
-    case Phase::lower:
-      if (advance(n, band, [&](int a, int b) { matrix_.solve_lower(shots_->column(column_), a, b); }) &&
-          ++column_ == shots_->count()) {
-        phase_ = Phase::form, column_ = 0;
-      }
-      return false;
-    case Phase::form:
-      if (advance(column_ + 1, n, [&](int a, int b) { shots_->form(column_, a, b, right_); }) &&
-          ++column_ == shots_->count()) {
-        phase_ = Phase::schur, column_ = 0;
-      }
-      return false;
-    case Phase::schur:
-      if (!shots_->factor_row(column_, rho_)) return std::unexpected(Error::singular);
-      if (++column_ == shots_->count()) {
-        take_offsets();
-        phase_ = Phase::offsets, column_ = 0;
-      }
-      return false;
-    case Phase::offsets: {
-      // y - W d, and on the way y'(y - W d), in slices of rows.
-      if (advance(n, shots_->count(), [&](int a, int b) {
-            double before_after = 0;
-            for (int i = a; i < b; ++i) {
-              double moved = right_[i];
-              for (int s = 0; s < shots_->count(); ++s) moved -= shots_->column(s)[i] * shots_->offset(s);
-              before_after += right_[i] * moved;
-              right_[i] = moved;
-            }
-            objective_ -= before_after;
-          })) {
+        estimate_noise(ConstVector(right_.data(), n).squaredNorm());
         phase_ = Phase::backward;
       }
       return false;
-    }
+    case Phase::touch:
+    case Phase::columns:
+    case Phase::scatter:
+    case Phase::lower:
+    case Phase::form:
+    case Phase::schur:
+    case Phase::offsets:
+      if (!step_shots()) return std::unexpected(Error::singular);
+      return false;
     case Phase::backward:
-      if (advance(n, band, [&](int a, int b) { matrix_.solve_upper(right_, n - b, n - a); }))
-        phase_ = Phase::energy;
+      if (advance(n, band, [&](int a, int b) { matrix_.solve_upper(right_, n - b, n - a); })) phase_ = Phase::energy;
       return false;
     case Phase::energy:
-      if (advance(rows, 3000.0 * cells, [&](int a, int b) {
-            for (; a < b; ++a) subtract_fairing_energy(a);
+      if (fairing_ <= 0 || advance(net.slow_rows(), 100.0 * n / net.slow_rows(), [&](int a, int b) {
+            objective_ -= fairing_ * net.fairing_energy(coefficients(), a, b, task_.length_u_mm, task_.length_v_mm);
           })) {
-        result_.squares = std::max(objective_, 0.0);
+        phase_ = Phase::sparse_energy;
+      }
+      return false;
+    case Phase::sparse_energy:
+      if (sparse_fairing_ <= 0 || advance(rows, fairing_cost * cells, [&](int a, int b) {
+            for (; a < b; ++a) subtract_sparse_energy(a);
+          })) {
+        finish();
         phase_ = Phase::done;
         return true;
       }
@@ -227,6 +352,14 @@ std::expected<bool, Error> NetSolver::step() {
       return true;
   }
   return true;
+}
+
+std::expected<void, Error> NetSolver::solve() {
+  while (true) {
+    const auto ready = step();
+    if (!ready) return std::unexpected(ready.error());
+    if (*ready) return {};
+  }
 }
 
 double NetSolver::progress() const { return static_cast<double>(phase_) / static_cast<double>(Phase::done); }

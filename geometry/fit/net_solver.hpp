@@ -1,19 +1,25 @@
-// Solves one net: moments to normal equations, fairing, factor, shot offsets, coefficients, residual. In
+// Solves one net: moments to normal equations, fairing, boundary, factor, shot offsets, coefficients, residual. In
 // bounded pieces.
 //
-// Cost         unknowns * half_band^2 in all; a piece at most about 200,000 multiply-adds
+// Objective    sum w (z - f)^2 + fairing, the thin-plate energy with a weight relative to the data (ratio of traces)
+// Boundary     the outer ring of coefficients, if given: moved to the right side (thesis eq. 3.40, 3.41), or pulled at with
+//              a weight
+// Cost         unknowns * half_band^2 / 2 in all. A step takes at most `work_a_step` multiply-adds, or one panel of eight
+//              columns, if that is more; work() counts them
 // Allocation   in the constructor only
-// Failure      Error::singular where a pivot is not positive
+// Failure      Error::singular where a pivot is not positive; singular_unknown() says which
 #pragma once
 
+#include <cstdint>
 #include <expected>
+#include <limits>
 #include <span>
 #include <vector>
 
-#include "geometry/splines/band_cholesky.hpp"
 #include "geometry/error.hpp"
 #include "geometry/fit/shot_offsets.hpp"
 #include "geometry/fit/spline_net.hpp"
+#include "geometry/splines/band_cholesky.hpp"
 
 namespace moldloft::geometry {
 
@@ -28,9 +34,14 @@ struct NetTask {
   const MomentGrid* moments = nullptr;
   PointTotals totals;
   double length_u_mm = 1, length_v_mm = 1;
-  double fairing = 0;
+  double fairing = 0;               // everywhere
+  double sparse_fairing = 0;        // on top, in cells with fewer points than sparse_points
+  std::uint32_t sparse_points = 1;
   double shot_sigma_mm = 0;   // 0: no offsets
   double point_sigma_mm = 0;  // of one point of weight 1; 0: estimated from this net without offsets
+  // Coefficients whose outer ring is given, by net->index(); empty: free. Not together with shot offsets.
+  std::span<const double> boundary;
+  double boundary_weight = std::numeric_limits<double>::infinity();  // in points; infinite: interpolated
 };
 
 struct NetResult {
@@ -38,19 +49,29 @@ struct NetResult {
   double freedom = 0;  // degrees of freedom that the model takes: coefficients with data, and offsets
   double point_sigma_mm = 0;
   double smallest_pivot = 0;  // relative to the largest
-  int empty_cells = 0;
+  int smallest_pivot_unknown = 0;
+  int empty_cells = 0, sparse_cells = 0;  // without points; with some, but fewer than sparse_points
   double offset_rms_mm = 0, offset_max_mm = 0;
 };
 
 class NetSolver {
  public:
+  // 200,000 multiply-adds take 20 us with AVX-512 and 100 us on the slowest machine that we know.
+  static constexpr double work_a_step = 200'000;
+
   NetSolver(std::size_t max_unknowns, std::size_t max_half_band);
 
   void start(const NetTask&, ShotOffsets*);
   std::expected<bool, Error> step();
+  std::expected<void, Error> solve();  // all steps
   double progress() const;
   const NetResult& result() const { return result_; }
   std::span<const double> coefficients() const { return {right_.data(), static_cast<std::size_t>(size())}; }
+  int singular_unknown() const { return matrix_.failed_column(); }
+  double work() const { return work_; }  // multiply-adds of the last step
+  const BandCholesky& factor() const { return matrix_; }
+  double norm_one() const { return norm_one_; }  // of the matrix that was factored, if asked for before
+  void want_norm(bool wanted) { norm_wanted_ = wanted; }
   std::size_t bytes() const;
 
  private:
@@ -58,8 +79,11 @@ class NetSolver {
     clear,
     data,
     fair,
+    border,
+    norm,
     factor,
     forward,
+    touch,
     columns,
     scatter,
     lower,
@@ -68,28 +92,38 @@ class NetSolver {
     offsets,
     backward,
     energy,
+    sparse_energy,
     done
   };
 
   int size() const { return task_.net->unknowns(); }
-  int slice(double cost_of_one) const;
   // Advances the cursor by one slice; true when it has reached `end`, and then it starts again from 0.
   template <typename Piece>
-  bool advance(int end, double cost_of_one, Piece&& piece);
+  bool advance(int end, double cost_of_one, Piece&& piece, int grain = 1);
   void add_data_row(int row);
-  void add_fairing_row(int row);
-  void subtract_fairing_energy(int row);
-  void estimate_noise();
+  void add_sparse_fairing_row(int row);
+  void add_border();
+  void take_norm(int first, int end);
+  bool on_border(int unknown) const;
+  void subtract_sparse_energy(int row);
+  void estimate_noise(double y_squared);
   void take_offsets();
+  bool step_shots();
+  // One shot at a time, until the step is full; true when all are done.
+  template <typename Piece>
+  bool each_shot(double cost_of_cell, Piece&& piece);
+  void finish();
 
   NetTask task_;
   ShotOffsets* shots_ = nullptr;
   NetResult result_;
   BandCholesky matrix_;
-  std::vector<double> right_, data_diagonal_;
+  std::vector<double> right_, data_diagonal_, column_sums_;
   Phase phase_ = Phase::done;
-  int cursor_ = 0, column_ = 0;
-  double trace_data_ = 0, trace_fairing_ = 0, fairing_ = 0, rho_ = 0, objective_ = 0;
+  int cursor_ = 0, column_ = 0, row_ = 0;
+  bool norm_wanted_ = false;
+  double trace_data_ = 0, fairing_ = 0, sparse_fairing_ = 0, rho_ = 0, objective_ = 0, border_squares_ = 0;
+  double work_ = 0, norm_one_ = 0;
 };
 
 }  // namespace moldloft::geometry

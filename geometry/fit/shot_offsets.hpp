@@ -1,11 +1,13 @@
 // The unknown height errors of the shots, fitted together with the surface.
 //
-// With d_s the offset of shot s, prior weight rho = (sigma / sigma_shot)^2, and L the band factor of the
-// surface's normal equations, the bordered system is eliminated on the shots:
+// With d_s the offset of shot s, prior weight rho = (sigma / sigma_shot)^2, and L the band factor of the surface's
+// normal equations, the bordered system is eliminated on the shots:
 //     S d = h - W' y,   S = D + rho I - W' W,   W = L^-1 B,   y = L^-1 r
 // where column s of B holds the sums of the basis functions over the points of shot s (the right-hand side for z = 1),
 // D the number of points and h the sum of heights of every shot. The surface follows from L' c = y - W d.
 //
+// Columns      y and W side by side, row by row, in groups of eight columns; sorted by the first unknown that a shot
+//              touches, above which a column is zero, so that a group starts where its first shot does
 // Memory       a shot's moments are kept only for the cells that it touches; when the plan is full, the shot at
 //              hand and those after it are taken as exact and counted
 // Allocation   in the constructor only
@@ -25,27 +27,39 @@ class ShotOffsets {
   ShotOffsets(int max_shots, int cells_u, int cells_v, std::size_t max_shot_cells, std::size_t max_unknowns);
 
   void clear();
-  void add(int shot, int cell_u, int cell_v, const BernsteinValues& s, const BernsteinValues& t, double z,
-           double weight);
-  void finish_adding();  // before the columns are built
-  int count() const {
-    return static_cast<int>(slots_.size());
-  }  // shots with points, in order of their numbers
+  // All points of one shot come before those of the next. The block's shot rows must have been wanted.
+  void add(int shot, const PointBlock&);
+  void finish_adding();  // before anything below
+  // Shots with points, in order of their numbers.
+  int count() const { return static_cast<int>(slots_.size()); }
   int exact() const { return exact_; }
 
-  // For one net: clear, scatter all shot cells in chunks, bring every column to W by the caller's band solve,
-  // then form the rows of S one by one, and factor and solve it.
-  void start(int unknowns);
-  std::span<double> column(int slot) {
-    return {&columns_[static_cast<std::size_t>(slot) * unknowns_], unknowns_};
-  }
-  std::size_t shot_cells() const { return cells_.size(); }
-  void scatter(const SplineNet&, int cells_u, int cells_v, std::size_t first, std::size_t end);
-  void form(int row, int first, int end,
-            std::span<const double> y);  // columns [first, end) of a row, end <= row + 1
+  std::size_t cells_of(int slot) const { return slots_[slot].end - slots_[slot].begin; }
+
+  // From one net to the next coarser one: every slot's cells merge, then coarsened() says to which net's.
+  void coarsen(int slot, const MomentGrid& to);
+  void coarsened(const MomentGrid& to) { level_u_ = to.cells_u(), level_v_ = to.cells_v(); }
+
+  // For one net: touch() every slot, start(), clear_rows(), scatter() every slot and the right-hand side of y, solve
+  // all groups by the caller's band solve, form() all blocks, then factor and solve.
+  void touch(int slot, const SplineNet&);
+  void start(const SplineNet&);
+  int row_length() const { return row_length_; }
+  int groups() const { return row_length_ / 8; }
+  int first_row(int group) const { return first_row_[group]; }
+  std::span<double> columns() { return {columns_.data(), unknowns_ * row_length_}; }
+  void clear_rows(int first, int end);
+  void scatter(int slot, const SplineNet&);
+  void set_y(int row, double right) { columns_[static_cast<std::size_t>(row) * row_length_] = right; }
+  // Adds the rows [first, end) to the block (a, b) of [y W]'[y W], b <= a, both groups.
+  void form(const BandKernel&, int group_a, int group_b, int first, int end);
+  double y_squared() const { return blocks_.empty() ? 0 : blocks_[0]; }
   bool factor_row(int row, double rho);  // rows in order
   void solve();
   double offset(int slot) const { return offsets_[slot]; }
+  // Row i of y - W d.
+  double moved(int row) const;
+  double y(int row) const { return columns_[static_cast<std::size_t>(row) * row_length_]; }
   // sum of h_s d_s: what the offsets take from the sum of squares
   double explained() const;
 
@@ -54,25 +68,34 @@ class ShotOffsets {
  private:
   struct Slot {
     int shot;
-    double weight, height;
+    std::size_t begin, end;  // of its cells
+    double height;           // sum of w z
+    double weight = 0;
+    int column = 0, first_row = 0;
   };
   struct ShotCell {
-    std::uint32_t cell;
-    std::uint32_t slot;
+    std::int32_t cell;
     std::array<double, 16> moments;
   };
-  int cells_u_, cells_v_;
+  void leave_shot();
+  std::int32_t place_of(std::int32_t cell);
+  void give_up(Slot&);
+  double gram(int column_a, int column_b) const;
+
+  int cells_u_, cells_v_;          // of the finest net
+  int level_u_ = 0, level_v_ = 0;  // of the net that the cells have been merged for
   std::size_t unknowns_ = 0;
-  int exact_ = 0, current_shot_ = -1;
+  int row_length_ = 8;
+  int exact_ = 0, current_slot_ = -1;
   bool current_is_exact_ = false;
   std::vector<std::int32_t> slot_of_shot_;
   std::vector<std::int32_t> place_of_cell_;  // of the shot at hand
   std::vector<Slot> slots_;
   std::vector<ShotCell> cells_;
-  std::vector<double> columns_, offsets_, right_;
+  std::vector<int> order_, first_row_;
+  std::vector<double, Eigen::aligned_allocator<double>> columns_, blocks_;
+  std::vector<double> offsets_, right_, coupled_;
   Eigen::MatrixXd schur_;
-
-  void leave_shot();
 };
 
 }  // namespace moldloft::geometry

@@ -20,6 +20,9 @@ constexpr int fewest_spans = 4;  // of a side as well: the nets must refine the 
 // control points on it.
 constexpr double dof_inflation = 1.4;
 
+// Multiply-adds, about: of a cell from four, and of a shot's cell into a coarser one.
+constexpr double merge_cost = 2000, restrict_cost = 200;
+
 // A net is tried when it has at least this many points for every unknown.
 constexpr double points_an_unknown = 4;
 
@@ -74,8 +77,10 @@ struct SurfaceFit::Work {
     }
   }
 
-  void fold(const Eigen::Vector2d& uv, double height, double weight, int shot);
+  void fold(int shot);
+  void take_totals();
   void start_level();
+  bool merge_some();
   void keep_if_best();
   void finish();
 
@@ -92,8 +97,11 @@ struct SurfaceFit::Work {
   Phase phase = Phase::adding;
   Error error = Error::too_few_points;
   std::size_t level = 0, first_level = 0, best = 0;
-  int row = 0;
+  int row = 0, shot = 0;
   double best_score = 0, point_sigma = 0;
+  double work = 0;
+  PointBlock block;
+  std::array<double, PointBlock::capacity> u, v;
 };
 
 SurfaceFit::SurfaceFit(const SurfaceFitSettings& settings) {
@@ -121,19 +129,22 @@ void SurfaceFit::begin(const PlanMap& map) {
   work_->totals = {};
   work_->report = {};
   work_->last_uv = {0.5, 0.5};
+  work_->block.count = 0, work_->block.shot_rows_wanted = work_->settings.shot_sigma_mm > 0;
   work_->phase = Work::Phase::adding;
 }
 
-void SurfaceFit::Work::fold(const Eigen::Vector2d& uv, double height, double weight, int shot) {
+// The block's heights and weights, and u and v, are there.
+void SurfaceFit::Work::fold(int shot) {
+  if (block.count == 0) return;
+  const MomentKernel& kernel = moment_kernel();
+  MomentGrid& finest = moments.front();
   const int nu = settings.max_spans_u, nv = settings.max_spans_v;
-  const int i = std::clamp(static_cast<int>(uv.x() * nu), 0, nu - 1),
-            j = std::clamp(static_cast<int>(uv.y() * nv), 0, nv - 1);
-  const BernsteinValues s = bernstein(uv.x() * nu - i), t = bernstein(uv.y() * nv - j);
-  moments.front().cell(i, j).add(s, t, height, weight);
-  if (settings.shot_sigma_mm > 0) shots.add(shot, i, j, s, t, height, weight);
-  ++totals.points;
-  totals.weight += weight;
-  totals.squares += weight * height * height;
+  kernel.locate(block, u.data(), v.data(), {nu, nv, double(nu), double(nv), 0, 0});
+  kernel.values(block);
+  kernel.fold(block, finest.cells(), finest.counts());
+  if (settings.shot_sigma_mm > 0) shots.add(shot, block);
+  totals.points += static_cast<std::uint64_t>(block.count);
+  block.count = 0;
 }
 
 std::expected<void, Error> SurfaceFit::add(std::span<const Eigen::Vector3d> world_points, double weight,
@@ -142,6 +153,8 @@ std::expected<void, Error> SurfaceFit::add(std::span<const Eigen::Vector3d> worl
   assert(work.map != nullptr);
   if (shot < 0 || shot >= work.settings.max_shots) return std::unexpected(Error::capacity);
   if (!(weight > 0) || !std::isfinite(weight)) return std::unexpected(Error::not_finite);
+  PointBlock& block = work.block;
+  block.weighted = weight != 1;
   for (const Eigen::Vector3d& point : world_points) {
     if (!point.allFinite()) {
       ++work.report.points_off;
@@ -153,17 +166,23 @@ std::expected<void, Error> SurfaceFit::add(std::span<const Eigen::Vector3d> worl
       continue;
     }
     work.last_uv = *uv;
-    if (work.totals.points == 0) work.datum = point.z();
-    work.fold(*uv, point.z() - work.datum, weight, shot);
+    if (work.totals.points == 0 && block.count == 0) work.datum = point.z();
+    const int k = block.count++;
+    // Rounding may put a point of the rim outside by a hair.
+    work.u[k] = std::clamp(uv->x(), 0.0, 1.0), work.v[k] = std::clamp(uv->y(), 0.0, 1.0);
+    block.height[k] = point.z() - work.datum, block.weight[k] = weight;
+    if (block.count == PointBlock::capacity) work.fold(shot);
   }
+  work.fold(shot);
   return {};
 }
 
 void SurfaceFit::start_solving() {
   Work& work = *work_;
   work.shots.finish_adding();
+  work.take_totals();
   work.report.points_used = work.totals.points;
-  work.level = 0, work.row = 0;
+  work.level = 0, work.row = work.shot = 0;
   work.best_score = std::numeric_limits<double>::infinity();
   work.point_sigma = work.settings.noise_mm;
   // Nets with more unknowns than the points determine are passed over; their moments are merged all the same.
@@ -185,6 +204,16 @@ void SurfaceFit::start_solving() {
   }
 }
 
+void SurfaceFit::Work::take_totals() {
+  totals.weight = totals.squares = 0;
+  for (int i = 0; i < moments.front().cells_u(); ++i) {
+    for (int j = 0; j < moments.front().cells_v(); ++j) {
+      totals.weight += moments.front().cell(i, j).weight();
+      totals.squares += moments.front().cell(i, j).squares();
+    }
+  }
+}
+
 void SurfaceFit::Work::start_level() {
   const Eigen::Vector2d across = map->at(1, 0.5).value - map->at(0, 0.5).value;
   const Eigen::Vector2d along = map->at(0.5, 1).value - map->at(0.5, 0).value;
@@ -198,6 +227,26 @@ void SurfaceFit::Work::start_level() {
                 .point_sigma_mm = point_sigma},
                &shots);
   phase = Phase::solve;
+}
+
+// Rows of cells, then the shots' cells, into those of the next net; true when all are merged.
+bool SurfaceFit::Work::merge_some() {
+  MomentGrid& grid = moments[level];
+  const double row_cost = merge_cost * grid.cells_v();
+  while (row < grid.cells_u()) {
+    if (work > 0 && work + row_cost > NetSolver::work_a_step) return false;
+    grid.merge_row(row++, moments[level - 1]);
+    work += row_cost;
+  }
+  while (shot < shots.count()) {
+    const double cost = 30 + restrict_cost * static_cast<double>(shots.cells_of(shot));
+    if (work > 0 && work + cost > NetSolver::work_a_step) return false;
+    shots.coarsen(shot++, grid);
+    work += cost;
+  }
+  shots.coarsened(grid);
+  row = shot = 0;
+  return true;
 }
 
 // The offsets are part of every net's model, so a finer net gains nothing by following the shots' steps.
@@ -236,20 +285,18 @@ std::expected<bool, Error> SurfaceFit::step() {
       return std::unexpected(work.error);
     case Work::Phase::done:
       return true;
-    case Work::Phase::merge: {
-      MomentGrid& grid = work.moments[work.level];
-      grid.merge_row(work.row, work.moments[work.level - 1]);
-      if (++work.row < grid.cells_u()) return false;
-      work.row = 0;
+    case Work::Phase::merge:
+      work.work = 0;
+      if (!work.merge_some()) return false;
       if (work.level < work.first_level) {
         ++work.level;
       } else {
         work.start_level();
       }
       return false;
-    }
     case Work::Phase::solve: {
       const auto solved = work.solver.step();
+      work.work = work.solver.work();
       if (!solved) {
         work.error = solved.error(), work.phase = Work::Phase::failed;
         return std::unexpected(work.error);

@@ -2,66 +2,58 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <limits>
 
 namespace moldloft::geometry {
 
 namespace {
 
-using Column = Eigen::Map<Eigen::VectorXd>;
-using ConstColumn = Eigen::Map<const Eigen::VectorXd>;
+constexpr std::size_t lead = 16;  // before the first column: whole vectors may begin above the diagonal
+
+std::size_t leading_dimension(std::size_t half_band) { return (half_band + 17 + 7) / 8 * 8; }
+
+std::size_t storage(std::size_t size, std::size_t half_band) {
+  return lead + size * (leading_dimension(half_band) + 1) + 16;
+}
 
 }  // namespace
 
-BandCholesky::BandCholesky(std::size_t max_size, std::size_t max_half_band)
-    : band_(max_size * (max_half_band + 1)) {}
+BandCholesky::BandCholesky(std::size_t max_size, std::size_t max_half_band, Simd simd)
+    : kernel_(&band_kernel(simd)), band_(storage(max_size, max_half_band)), pack_(16 * (max_half_band + 24)) {
+  // Aligned so that rows whose number is a multiple of 8 begin a cache line.
+  start_ = band_.data() + lead;
+}
 
 void BandCholesky::reset(int size, int half_band) {
-  assert(static_cast<std::size_t>(size) * (half_band + 1) <= band_.size());
-  size_ = size, half_band_ = half_band, stride_ = half_band + 1;
-  smallest_ = std::numeric_limits<double>::infinity(), largest_ = 0;
+  assert(storage(size, half_band) <= band_.size() && 16u * (half_band + 24) <= pack_.size());
+  size_ = size, half_band_ = half_band;
+  ld_ = static_cast<std::ptrdiff_t>(leading_dimension(half_band));
+  pivots_ = {.smallest = std::numeric_limits<double>::infinity()};
 }
 
 void BandCholesky::clear(int first_column, int end_column) {
-  std::fill(band_.begin() + static_cast<std::size_t>(first_column) * stride_,
-            band_.begin() + static_cast<std::size_t>(end_column) * stride_, 0.0);
+  std::fill(start_ + first_column * (ld_ + 1), start_ + end_column * (ld_ + 1), 0.0);
 }
 
 bool BandCholesky::factor(int first, int end) {
-  for (int j = first; j < end; ++j) {
-    double* column = &band_[static_cast<std::size_t>(j) * stride_];
-    const double pivot = column[0];
-    if (!(pivot > 0) || !std::isfinite(pivot)) return false;
-    smallest_ = std::min(smallest_, pivot), largest_ = std::max(largest_, pivot);
-    const int n = reach(j);
-    const double root = std::sqrt(pivot);
-    column[0] = root;
-    Column(column + 1, n) /= root;
-    for (int k = 1; k <= n; ++k) {
-      if (column[k] == 0) continue;
-      Column(&band_[static_cast<std::size_t>(j + k) * stride_], n - k + 1) -=
-          column[k] * ConstColumn(column + k, n - k + 1);
-    }
+  for (int j = first; j < end; j += band_panel) {
+    if (!kernel_->factor_panel(matrix(), j, std::min(end - j, band_panel), pack_.data(), pivots_)) return false;
   }
   return true;
 }
 
 void BandCholesky::solve_lower(std::span<double> x, int first, int end) const {
-  for (int j = first; j < end; ++j) {
-    const double* column = &band_[static_cast<std::size_t>(j) * stride_];
-    x[j] /= column[0];
-    const int n = reach(j);
-    Column(x.data() + j + 1, n) -= x[j] * ConstColumn(column + 1, n);
-  }
+  kernel_->solve_lower(matrix(), x.data(), first, end);
 }
 
 void BandCholesky::solve_upper(std::span<double> x, int first, int end) const {
-  for (int j = end; j-- > first;) {
-    const double* column = &band_[static_cast<std::size_t>(j) * stride_];
-    const int n = reach(j);
-    x[j] = (x[j] - ConstColumn(column + 1, n).dot(ConstColumn(x.data() + j + 1, n))) / column[0];
-  }
+  kernel_->solve_upper(matrix(), x.data(), first, end);
+}
+
+void BandCholesky::solve_lower_many(std::span<double> x, int row_length, int first_side, int sides, int first,
+                                    int end) const {
+  assert(first_side % 8 == 0 && sides % 8 == 0 && first_side + sides <= row_length);
+  kernel_->solve_lower_many(matrix(), x.data(), row_length, first_side, sides, first, end);
 }
 
 }  // namespace moldloft::geometry
