@@ -26,5 +26,6 @@ function(moldloft_room name)
   add_library(moldloft_${name} STATIC ${ROOM_SOURCES})
   add_library(moldloft::${name} ALIAS moldloft_${name})
   target_include_directories(moldloft_${name} PUBLIC $<BUILD_INTERFACE:${view}>)
-  target_link_libraries(moldloft_${name} PUBLIC ${ROOM_PUBLIC} PRIVATE moldloft_build_options ${ROOM_PRIVATE})
+  target_link_libraries(moldloft_${name} PUBLIC ${ROOM_PUBLIC}
+    PRIVATE $<BUILD_INTERFACE:moldloft_build_options> ${ROOM_PRIVATE})
 endfunction()

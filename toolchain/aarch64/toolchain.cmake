@@ -12,5 +12,10 @@ set(CMAKE_LIBRARY_ARCHITECTURE aarch64-linux-gnu)
 # Headers without machine code (Eigen, CLI11, doctest, Asio, nlohmann-json) serve both; libraries must be arm64's.
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(ENV{PKG_CONFIG_LIBDIR} /usr/lib/aarch64-linux-gnu/pkgconfig:/usr/share/pkgconfig)
-# The tests would need an emulator to be listed one by one.
-set(MOLDLOFT_TESTS OFF CACHE BOOL "Build the tests" FORCE)
+# Tests run under qemu-user where it is installed; ask for them with -D MOLDLOFT_TESTS=ON. The geometry library alone
+# (-D MOLDLOFT_GEOMETRY_ONLY=ON) needs the compiler and no arm64 package.
+set(MOLDLOFT_TESTS OFF CACHE BOOL "Build the tests")
+find_program(moldloft_emulator qemu-aarch64)
+if(moldloft_emulator)
+  set(CMAKE_CROSSCOMPILING_EMULATOR ${moldloft_emulator} -L /usr/aarch64-linux-gnu)
+endif()
