@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "firmware_like/export_command.hpp"
 #include "firmware_like/machines.hpp"
 #include "firmware_like/run_command.hpp"
 
@@ -24,6 +25,12 @@ int main(int argc, char** argv) {
   fit_command->add_option("run", fit.run, "the run's folder")->required();
   fit_command->add_option("--out", fit.out, "where the results go")->required();
 
+  ExportOptions to_cad;
+  auto* export_command = app.add_subcommand("export", "the surface of a run as STEP and IGES files");
+  export_command->add_option("run", to_cad.run, "the run's folder, or a surface.json")->required();
+  export_command->add_option("--step", to_cad.step, "the STEP file to write (AP242)");
+  export_command->add_option("--iges", to_cad.iges, "the IGES file to write (5.3)");
+
   auto* machines_command = app.add_subcommand("machines", "print the state machines as Mermaid diagrams");
 
   try {
@@ -33,6 +40,7 @@ int main(int argc, char** argv) {
   }
   if (*run_command) return run_cell(run);
   if (*fit_command) return fit_run(fit);
+  if (*export_command) return export_run(to_cad);
   if (*machines_command) {
     fmt::print("{}", machine_diagrams());
     return exit_done;

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "firmware_like/cad_files.hpp"
 #include "firmware_like/measured_points.hpp"
 #include "firmware_like/ply_writer.hpp"
 
@@ -59,6 +60,7 @@ Json summary_of(const Controller& c, const RunLabel& label) {
   j["message"] = std::string{cell.why().view()};
   j["plate"] = label.plate;
   j["seed"] = label.seed ? Json(*label.seed) : Json(nullptr);
+  if (!label.begun.empty()) j["begun"] = label.begun;
   j["shots"] = {{"seek", purpose(hal::ShotPurpose::seek)},
                 {"boundary", purpose(hal::ShotPurpose::boundary)},
                 {"surface", purpose(hal::ShotPurpose::surface)},
@@ -77,6 +79,7 @@ Json summary_of(const Controller& c, const RunLabel& label) {
     j["surface"] = {{"control_points", {surface.control_u(), surface.control_v()}},
                     {"rms_residual_mm", rounded(report.rms_residual_mm)},
                     {"sigma_mm", rounded(report.sigma_mm)},
+                    {"tolerance_mm", c.config().fit_tolerance_mm},
                     {"smallest_pivot", report.smallest_pivot},
                     {"empty_cells", report.empty_cells},
                     {"shot_offset_rms_mm", rounded(report.shot_offset_rms_mm)},
@@ -96,17 +99,6 @@ Json summary_of(const Controller& c, const RunLabel& label) {
   j["memory"]["subsystems"] = parts;
   j["recorder_lost"] = c.recorder().lost();
   return j;
-}
-
-Json surface_json(const geometry::BSplineSurface& s) {
-  Json control = Json::array();
-  for (int i = 0; i < s.control_u(); ++i) {
-    Json row = Json::array();
-    for (int k = 0; k < s.control_v(); ++k) row.push_back({s.x(i, k), s.y(i, k), s.z(i, k)});
-    control.push_back(row);
-  }
-  return {{"schema", 1},          {"unit", "mm"},         {"frame", "world"},  {"degree", {3, 3}},
-          {"knots_u", s.knots_u}, {"knots_v", s.knots_v}, {"control", control}};
 }
 
 Json timing_of(const Controller& c) {
@@ -215,6 +207,13 @@ std::expected<void, RunError> write_results(const Controller& c, const RunFolder
     const auto points = measured_points(c, *folder.store, points_in_ply, gate);
     if (!points) return std::unexpected{RunError{points.error().what}};
     write("surface.json", surface_json(surface).dump() + "\n");
+    const CadFacts facts = cad_facts(summary);
+    const auto step = step_file(surface, facts, "surface.step"),
+               iges = iges_file(surface, facts, "surface.igs");
+    if (!step) return std::unexpected{step.error()};
+    if (!iges) return std::unexpected{iges.error()};
+    write("surface.step", *step);
+    write("surface.igs", *iges);
     write("boundary.ply", boundary_ply(surface, 100));
     write("points.ply", points_ply(*points));
     fields = {shape_field(surface, picture_cells),

@@ -1,8 +1,8 @@
 // What a run leaves in its folder besides run.db: summary.json, boundary.ply, points.ply, surface.json,
-// timing.json, events.jsonl and overview.svg. Written after the cell has come to rest; every file states its
-// unit.
+// surface.step, surface.igs, timing.json, events.jsonl and overview.svg. Written after the cell has come to rest;
+// every file states its unit.
 //
-// summary.json, surface.json and events.jsonl depend on the run alone, never on the machine: a simulated run with the
+// summary.json, surface.* and events.jsonl depend on the run alone, never on the machine: a simulated run with the
 // same seed gives the same bytes. What was measured in wall-clock time stands in timing.json.
 //
 // Blocking     yes: writes files
@@ -12,25 +12,23 @@
 #include <cstdint>
 #include <expected>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
 #include "firmware_like/controller.hpp"
 #include "firmware_like/picture.hpp"
 #include "firmware_like/run_folder.hpp"
+#include "firmware_like/surface_file.hpp"
 
 namespace moldloft::firmware_like {
 
 struct RunLabel {
   std::string plate = "measured";
   std::optional<std::uint64_t> seed;  // of a simulated run
+  std::string begun = {};             // when, UTC, as the run's store holds it; empty in a simulated run
 };
 
-using Json = nlohmann::ordered_json;
-
 Json summary_of(const Controller&, const RunLabel&);
-Json surface_json(const geometry::BSplineSurface&);
 Json timing_of(const Controller&);
 
 // Everything that can be written for the state that the run is in: a run that did not complete has no surface.

@@ -93,6 +93,9 @@ std::uint32_t fresh_epoch() {
   return (device() ^ static_cast<std::uint32_t>(std::time(nullptr))) & 0xFFFFFu;
 }
 
+// When the run began; stores of before that was kept do not know.
+std::string begun_of(const hal::RunStore& store) { return store.meta("begun").value_or(""); }
+
 }  // namespace
 
 int exit_code(const Controller& controller) {
@@ -178,7 +181,7 @@ int run_cell(const RunOptions& options) {
     discard_run(std::move(*folder));
     return complain(why_refused(*controller)), code == exit_aborted ? exit_failed : code;
   }
-  const RunLabel label{.plate = config->name, .seed = {}};
+  const RunLabel label{.plate = config->name, .seed = {}, .begun = begun_of(*folder->store)};
   const Json summary = summary_of(*controller, label);
   if (controller->recorder().store_failed())
     complain(
@@ -206,7 +209,7 @@ int fit_run(const FitOptions& options) {
   controller->start();
   while (controller->tick()) {
   }
-  const RunLabel label{.plate = config->name, .seed = {}};
+  const RunLabel label{.plate = config->name, .seed = {}, .begun = begun_of(*run->store)};
   const Json summary = summary_of(*controller, label);
   std::error_code failed;
   if (std::filesystem::equivalent(options.run, options.out, failed)) {

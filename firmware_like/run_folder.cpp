@@ -16,6 +16,11 @@ std::unexpected<RunError> error(std::string what) { return std::unexpected{RunEr
 
 fs::path store_path(const fs::path& folder) { return folder / "run.db"; }
 
+std::string now_utc() {
+  const std::time_t now = std::time(nullptr);
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", *std::gmtime(&now));
+}
+
 std::string kind_name(RunKind kind) { return kind == RunKind::simulated ? "simulated" : "measured"; }
 
 void remove_store(const fs::path& folder) {
@@ -51,8 +56,11 @@ std::expected<RunFolder, RunError> create_run(const fs::path& path, const std::s
   }
   auto store = hal::RunStore::open(store_path(path), hal::RunStore::Mode::create);
   if (!store) return error(store.error().what);
-  for (const auto& [key, value] :
-       {std::pair<std::string, std::string>{"kind", kind_name(kind)}, {"config", config_text}}) {
+  std::vector<std::pair<std::string, std::string>> about = {{"kind", kind_name(kind)},
+                                                            {"config", config_text}};
+  // A simulated run happens at no time: its seed brings it back, byte for byte.
+  if (kind == RunKind::measured) about.emplace_back("begun", now_utc());
+  for (const auto& [key, value] : about) {
     if (auto written = store->set_meta(key, value); !written) return error(written.error().what);
   }
   return RunFolder{path, std::make_unique<hal::RunStore>(std::move(*store)), nullptr, made_folder};

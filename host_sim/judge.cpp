@@ -7,9 +7,9 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <optional>
 
+#include "firmware_like/surface_file.hpp"
 #include "host_sim/plan_polygon.hpp"
 
 namespace moldloft::host_sim {
@@ -17,7 +17,6 @@ namespace moldloft::host_sim {
 namespace {
 
 using geometry::BSplineSurface;
-using Json = nlohmann::ordered_json;
 
 Eigen::Vector2d clamped(const Eigen::Vector2d& uv) { return uv.cwiseMax(0.0).cwiseMin(1.0); }
 
@@ -107,14 +106,6 @@ double corner_distance(const std::array<Eigen::Vector2d, 4>& truth,
   return best;
 }
 
-std::expected<Json, SimError> read_json(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) return std::unexpected(SimError{path + ": cannot be opened"});
-  Json json = Json::parse(file, nullptr, false);
-  if (json.is_discarded()) return std::unexpected(SimError{path + ": not JSON"});
-  return json;
-}
-
 void compare_grid(const PlateInstance& truth, const BSplineSurface& measured, Verdict& verdict) {
   const auto world_from_plate = truth.world_from_plate();
   const auto& c = truth.plate->corners();
@@ -160,49 +151,12 @@ std::expected<Verdict, SimError> judge(const PlateInstance& truth, const BSpline
   return verdict;
 }
 
-std::expected<BSplineSurface, SimError> read_surface(const std::string& path) {
-  const auto json = read_json(path);
-  if (!json) return std::unexpected(json.error());
-  const auto refused = [&](std::string_view why) {
-    return std::unexpected(SimError{fmt::format("{}: {}", path, why)});
-  };
-  try {
-    if (json->at("schema") != 1 || json->at("unit") != "mm") return refused("schema 1 in mm is needed");
-    if (json->at("degree") != Json::array({3, 3})) return refused("the surface must be bicubic");
-    BSplineSurface surface;
-    surface.knots_u = json->at("knots_u").get<std::vector<double>>();
-    surface.knots_v = json->at("knots_v").get<std::vector<double>>();
-    const auto& control = json->at("control");
-    const auto rows = static_cast<Eigen::Index>(control.size());
-    const auto columns = rows > 0 ? static_cast<Eigen::Index>(control.at(0).size()) : 0;
-    if (rows < 4 || columns < 4 || surface.knots_u.size() != static_cast<std::size_t>(rows) + 4 ||
-        surface.knots_v.size() != static_cast<std::size_t>(columns) + 4) {
-      return refused("knots and control points do not fit together");
-    }
-    for (auto* net : {&surface.x, &surface.y, &surface.z}) net->resize(rows, columns);
-    for (Eigen::Index i = 0; i < rows; ++i) {
-      if (static_cast<Eigen::Index>(control[static_cast<std::size_t>(i)].size()) != columns) {
-        return refused("rows of control points differ in length");
-      }
-      for (Eigen::Index j = 0; j < columns; ++j) {
-        const auto& point = control[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
-        surface.x(i, j) = point.at(0);
-        surface.y(i, j) = point.at(1);
-        surface.z(i, j) = point.at(2);
-      }
-    }
-    return surface;
-  } catch (const nlohmann::json::exception& error) {
-    return refused(error.what());
-  }
-}
-
 std::expected<Verdict, SimError> judge_run(const std::string& folder, const PlateInstance& truth) {
-  const auto surface = read_surface(folder + "/surface.json");
-  if (!surface) return std::unexpected(surface.error());
+  const auto surface = firmware_like::read_surface(folder + "/surface.json");
+  if (!surface) return std::unexpected(SimError{surface.error().what});
   const std::string path = folder + "/summary.json";
-  auto summary = read_json(path);
-  if (!summary) return std::unexpected(summary.error());
+  auto summary = firmware_like::read_json(path);
+  if (!summary) return std::unexpected(SimError{summary.error().what});
   std::array<Eigen::Vector2d, 4> corners;
   try {
     const auto& given = summary->at("boundary").at("corners_mm");

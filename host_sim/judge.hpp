@@ -35,10 +35,6 @@ struct Verdict {
 std::expected<Verdict, SimError> judge(const PlateInstance& truth, const geometry::BSplineSurface& measured,
                                        const std::array<Eigen::Vector2d, 4>& measured_corners);
 
-// surface.json:
-//     {"schema":1,"unit":"mm","degree":[3,3],"knots_u":[..],"knots_v":[..],"control":[[[x,y,z],..],..]}
-std::expected<geometry::BSplineSurface, SimError> read_surface(const std::string& path);
-
 // Judges a run folder: reads surface.json and summary.json (boundary.corners_mm), writes `truth` into summary.json.
 std::expected<Verdict, SimError> judge_run(const std::string& folder, const PlateInstance& truth);
 

@@ -32,6 +32,7 @@ TEST_CASE("a run's folder is made with all folders above it, and holds the confi
   REQUIRE(run.has_value());
   CHECK(*run->store->meta("config") == config);
   CHECK(*run->store->meta("kind") == "measured");
+  CHECK(std::regex_match(*run->store->meta("begun"), std::regex{R"(20\d\d-\d\d-\d\dT\d\d:\d\d:\d\dZ)"}));
   CHECK(run->archive->size() == 0);
   CHECK(run->archive->last() == 0);
 }
@@ -71,6 +72,7 @@ TEST_CASE("a simulated run, which its seed brings back, makes room for another s
   const auto again = create_run(path, "[start]\nyaw_deg = 4\n", RunKind::simulated);
   REQUIRE(again.has_value());
   CHECK_FALSE(again->made_folder);
+  CHECK_FALSE(again->store->meta("begun").has_value());  // it happens at no time
   CHECK(*again->store->meta("config") == "[start]\nyaw_deg = 4\n");
 }
 

@@ -1,6 +1,7 @@
 // The whole cell under virtual time: controller, cables, devices, plate; nothing goes wrong here.
 #include <doctest/doctest.h>
 
+#include "firmware_like/export_command.hpp"
 #include "firmware_like/run_command.hpp"
 #include "host_sim/scripted_run.hpp"
 
@@ -41,8 +42,11 @@ TEST_CASE("the default run completes, and its summary says everything that it pr
   check_truth(s);
   CHECK(cell.states() == std::vector<std::string>{"Starting", "Execute", "Completing", "Complete"});
   CHECK(Json::parse(cell.file("summary.json")) == s);
-  for (const char* file :
-       {"boundary.ply", "points.ply", "surface.json", "timing.json", "overview.svg", "events.jsonl"}) {
+  const hal::TemporaryFolder cad;
+  CHECK(firmware_like::export_run({.run = cell.folder(), .step = cad.file("surface.step"), .iges = {}}) == 0);
+  CHECK(text_of(cad.file("surface.step")) == cell.file("surface.step"));
+  for (const char* file : {"boundary.ply", "points.ply", "surface.json", "surface.step", "surface.igs",
+                           "timing.json", "overview.svg", "events.jsonl"}) {
     CAPTURE(file);
     CHECK(cell.file(file).size() > 100);
   }
@@ -54,7 +58,7 @@ TEST_CASE("the same seed gives the same bytes, another seed others") {
   first.run();
   second.run();
   other.run();
-  for (const char* file : {"summary.json", "surface.json", "events.jsonl"}) {
+  for (const char* file : {"summary.json", "surface.json", "surface.step", "surface.igs", "events.jsonl"}) {
     CAPTURE(file);
     CHECK(first.file(file).size() > 1000);
     CHECK(first.file(file) == second.file(file));

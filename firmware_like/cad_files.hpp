@@ -1,0 +1,33 @@
+// surface.step and surface.igs: the measured surface for CAD systems, untrimmed, in millimetres and world coordinates.
+//
+// The bytes depend on the surface and on what is passed in, never on the time of writing: the time stamp in the files is
+// the moment when the run began. A simulated run has none, and its files say 1970-01-01.
+//
+// Failure      one line that says what is wrong with the surface
+#pragma once
+
+#include <expected>
+#include <optional>
+#include <string>
+
+#include "firmware_like/surface_file.hpp"
+
+namespace moldloft::firmware_like {
+
+struct CadFacts {
+  std::string plate = "measured";
+  std::string begun;                   // "2026-11-25T15:04:05Z"; empty: not known
+  std::optional<double> noise_mm;      // of one measured point about the surface
+  std::optional<double> tolerance_mm;  // what the fit was allowed to miss, rms
+};
+
+// What summary.json says of it.
+CadFacts cad_facts(const Json& summary);
+
+// `file_name` is what the file says that it is called.
+std::expected<std::string, RunError> step_file(const geometry::BSplineSurface&, const CadFacts&,
+                                               const std::string& file_name);
+std::expected<std::string, RunError> iges_file(const geometry::BSplineSurface&, const CadFacts&,
+                                               const std::string& file_name);
+
+}  // namespace moldloft::firmware_like

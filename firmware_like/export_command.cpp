@@ -1,0 +1,64 @@
+#include "firmware_like/export_command.hpp"
+
+#include <fmt/format.h>
+
+#include "firmware_like/cad_files.hpp"
+#include "firmware_like/run_command.hpp"
+
+namespace moldloft::firmware_like {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::unexpected<RunError> error(std::string what) { return std::unexpected(RunError{std::move(what)}); }
+
+std::expected<fs::path, RunError> surface_path(const fs::path& run) {
+  std::error_code failed;
+  if (!fs::exists(run, failed)) return error(fmt::format("{}: no such run or file", run.string()));
+  if (!fs::is_directory(run, failed)) return run;
+  if (fs::exists(run / "surface.json", failed)) return run / "surface.json";
+  return error(
+      fmt::format("{}: holds no surface.json; only a run that completed has a surface", run.string()));
+}
+
+// A folder says more of its surface than the surface alone; a file may have come without the rest.
+std::expected<CadFacts, RunError> facts_beside(const fs::path& surface) {
+  const fs::path summary = surface.parent_path() / "summary.json";
+  std::error_code failed;
+  if (!fs::exists(summary, failed)) return CadFacts{};
+  const auto json = read_json(summary);
+  if (!json) return std::unexpected(json.error());
+  return cad_facts(*json);
+}
+
+std::expected<void, RunError> exported(const ExportOptions& options) {
+  if (options.step.empty() && options.iges.empty())
+    return error("export: say where to with --step FILE, --iges FILE or both");
+  const auto path = surface_path(options.run);
+  if (!path) return std::unexpected(path.error());
+  const auto surface = read_surface(*path);
+  if (!surface) return std::unexpected(surface.error());
+  const auto facts = facts_beside(*path);
+  if (!facts) return std::unexpected(facts.error());
+  const auto write = [&](const fs::path& file, auto&& text_of) -> std::expected<void, RunError> {
+    if (file.empty()) return {};
+    const auto text = text_of(*surface, *facts, file.filename().string());
+    if (!text) return error(fmt::format("{}: cannot be exported as {}", path->string(), text.error().what));
+    if (auto written = write_file(file, *text); !written) return written;
+    fmt::print("{}: {} x {} control points, mm\n", file.string(), surface->control_u(), surface->control_v());
+    return {};
+  };
+  if (auto step = write(options.step, step_file); !step) return step;
+  return write(options.iges, iges_file);
+}
+
+}  // namespace
+
+int export_run(const ExportOptions& options) {
+  const auto done = exported(options);
+  if (done) return exit_done;
+  fmt::print(stderr, "moldloft: {}\n", done.error().what);
+  return exit_failed;
+}
+
+}  // namespace moldloft::firmware_like

@@ -1,0 +1,28 @@
+// surface.json: the measured surface as a run leaves it, written and read back without losing a bit.
+//
+//     {"schema":1,"unit":"mm","frame":"world","degree":[3,3],"knots_u":[..],"knots_v":[..],"control":[[[x,y,z],..],..]}
+//
+// with the net row by row along u.
+//
+// Blocking     read_surface reads a file
+// Failure      one line: which file, and what is wrong with it
+#pragma once
+
+#include <expected>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "firmware_like/run_folder.hpp"
+#include "geometry/splines/bspline.hpp"
+
+namespace moldloft::firmware_like {
+
+using Json = nlohmann::ordered_json;
+
+Json surface_json(const geometry::BSplineSurface&);
+std::expected<geometry::BSplineSurface, RunError> read_surface(const std::filesystem::path&);
+
+// Any file of ours that is JSON.
+std::expected<Json, RunError> read_json(const std::filesystem::path&);
+
+}  // namespace moldloft::firmware_like
