@@ -22,8 +22,8 @@ void BandedLeastSquares::add(int first, std::span<const double> coefficients, st
   std::fill(std::copy(coefficients.begin(), coefficients.end(), row_.begin()), row_.begin() + band_, 0.0);
   std::copy(right.begin(), right.end(), row_.begin() + band_);
 
-  // Every rotation turns the row's leading entry into the pivot of that unknown; then the row moves on by one. The fill
-  // behind `count` never leaves the band, since pivot rows end where the band does.
+  // Every rotation turns the row's leading entry into the pivot of that unknown; then the row moves on by
+  // one. The fill behind `count` never leaves the band, since pivot rows end where the band does.
   for (int unknown = first; unknown < unknowns_; ++unknown) {
     double* pivot = pivot_row(unknown);
     if (row_[0] != 0) {

@@ -1,11 +1,13 @@
-// The bilinear Coons patch of four boundary curves in space (thesis eq. 2.65), evaluated as it is defined, and the
-// same surface as a B-spline net (eq. 2.66-2.69).
+// The bilinear Coons patch of four boundary curves in space (thesis eq. 2.65), evaluated as it is defined,
+// and the same surface as a B-spline net (eq. 2.66-2.69).
 //
-// The net blends the boundary nets at the Greville abscissae, where a straight line at unit speed has its control
-// points; equal steps, as the thesis prints them in (2.69), are the same for Bezier curves and wrong for any other.
+// The net blends the boundary nets at the Greville abscissae, where a straight line at unit speed has its
+// control points; equal steps, as the thesis prints them in (2.69), are the same for Bezier curves and wrong
+// for any other.
 //
 // Units        millimetres; u and v in [0, 1], the curves' own parameters are stretched to that
-// Accuracy     the net agrees with the definition within 16 (p + q + knots inserted) eps of the largest coordinate
+// Accuracy     the net agrees with the definition within 16 (p + q + knots inserted) eps of the largest
+//              coordinate
 // Cost         a point: four curve points; the net: 12 flops and two curve refinements a control point
 // Allocation   none in at(); what is returned elsewhere
 // Failure      CoonsError: what check() finds in a curve, or corners_apart
@@ -35,8 +37,8 @@ struct CoonsError {
 
 class CoonsPatch {
  public:
-  // Ends may miss each other by `gap_mm`; the corner then lies halfway between them, and the patch keeps its sides only
-  // that well.
+  // Ends may miss each other by `gap_mm`; the corner then lies halfway between them, and the patch keeps its
+  // sides only that well.
   static std::expected<CoonsPatch, CoonsError> through(CoonsSides sides, double gap_mm = 1e-6);
 
   SurfacePoint at(double u, double v) const;

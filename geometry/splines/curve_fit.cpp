@@ -66,8 +66,8 @@ std::optional<CurveFitError> cannot_choose(Points<dim> points, std::span<const d
 
 int first_without_parameter(std::span<const double> knots, int degree, std::span<const double> parameters,
                             int first, int end) {
-  // Each control point in turn takes the first parameter where its basis function is not zero and that none before it
-  // took; equal parameters are one.
+  // Each control point in turn takes the first parameter where its basis function is not zero and that none
+  // before it took; equal parameters are one.
   std::size_t next = 0;
   for (int i = first; i < end; ++i) {
     const double low = knots[i], high = knots[i + degree + 1];

@@ -1,9 +1,11 @@
-// Least squares B-spline curves through a stripe of points (thesis section 3.2.1; The NURBS Book 9.4): over given knots,
-// or with as few control points as a tolerance allows, or as many as cross-validation asks for.
+// Least squares B-spline curves through a stripe of points (thesis section 3.2.1; The NURBS Book 9.4): over
+// given knots, or with as few control points as a tolerance allows, or as many as cross-validation asks for.
 //
-// Units        those of the points (mm here); parameters in the knots' domain, [0, 1] where they are chosen here
-// Accuracy     the least squares solution within 4 N p eps times the condition number of the collocation matrix, of the
-//              largest coordinate; a polynomial or spline that the knots can represent comes back within that
+// Units        those of the points (mm here); parameters in the knots' domain, [0, 1] where they are chosen
+//              here
+// Accuracy     the least squares solution within 4 N p eps times the condition number of the collocation
+//              matrix, of the largest coordinate; a polynomial or spline that the knots can represent comes
+//              back within that
 // Cost         N p^2 for a fit; N p^2 for every number of control points that is tried
 // Allocation   what is returned, and a triangle of n (p + 4) numbers
 // Failure      CurveFitError; see there
@@ -21,11 +23,13 @@ namespace moldloft::geometry {
 
 // too_few_points       fewer points than control points (`where`: how many there are)
 // not_finite           the point or parameter `where`
-// repeated_points      points where - 1 and where lie in one place, or the parameter `where` is below the one before it
+// repeated_points      points where - 1 and where lie in one place, or the parameter `where` is below the one
+//                      before it
 // outside_domain       the parameter `where` lies off the knots' domain
 // span_without_points  Schoenberg and Whitney: control point `where` has no parameter of its own between
 //                      knots[where] and knots[where + degree + 1]
-// singular             it has, but so near the border of that span that rounding decides about control point `where`
+// singular             it has, but so near the border of that span that rounding decides about control point
+//                      `where`
 // tolerance_not_met    `where`: the number of control points that came closest
 // what check_knots() finds, with `where` = 0
 struct CurveFitError {
@@ -64,8 +68,8 @@ template <int dim>
 std::expected<CurveFit<dim>, CurveFitError> fit_curve(Points<dim> points, std::span<const double> knots,
                                                       const CurveFitSettings& settings = {});
 
-// The fewest control points, on balanced knots (knots.hpp), with which no point is farther off than `tolerance`; every
-// number from degree + 1 up is tried, so there is no smaller one.
+// The fewest control points, on balanced knots (knots.hpp), with which no point is farther off than
+// `tolerance`; every number from degree + 1 up is tried, so there is no smaller one.
 template <int dim>
 std::expected<CurveFit<dim>, CurveFitError> fit_curve_within(Points<dim> points,
                                                              std::span<const double> parameters,
@@ -78,8 +82,8 @@ template <int dim>
 std::expected<CurveFit<dim>, CurveFitError> fit_curve_by_cross_validation(
     Points<dim> points, std::span<const double> parameters, const CurveFitSettings& settings = {});
 
-// The first control point among [first, end) that Schoenberg and Whitney find without a parameter of its own; `end` if
-// all have one. Parameters must not decrease.
+// The first control point among [first, end) that Schoenberg and Whitney find without a parameter of its own;
+// `end` if all have one. Parameters must not decrease.
 int first_without_parameter(std::span<const double> knots, int degree, std::span<const double> parameters,
                             int first, int end);
 

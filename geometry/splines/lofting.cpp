@@ -97,8 +97,8 @@ std::expected<Loft, LoftError> loft(std::span<const SpaceCurve> curves, std::spa
       return failed(Error::outside_domain, where);
   }
 
-  // [N] [R] = [C]: one equation a curve, one right side a coordinate of its control points (2.75, 2.82). Rows [first,
-  // end) of the net are sought.
+  // [N] [R] = [C]: one equation a curve, one right side a coordinate of its control points (2.75, 2.82). Rows
+  // [first, end) of the net are sought.
   const int first = settings.interpolate_ends ? 1 : 0, end = control_u - first;
   if (const int lonely = first_without_parameter(knots_u, degree, parameters, first, end); lonely != end)
     return failed(Error::span_without_points, lonely);

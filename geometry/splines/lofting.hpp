@@ -1,12 +1,14 @@
 // Lofting: a surface whose lines of constant u are given curves (thesis eq. 2.70-2.82).
 //
-// Curve k runs along v and becomes the line u = u_k; u_k is the mean of the chord-length parameters of the curves'
-// first and last points (2.70). Interpolation has as many control points along u as there are curves (2.74); fewer of
-// them fit the curves' control points in the least squares sense (2.82), which is what kinked, noisy curves want.
+// Curve k runs along v and becomes the line u = u_k; u_k is the mean of the chord-length parameters of the
+// curves' first and last points (2.70). Interpolation has as many control points along u as there are curves
+// (2.74); fewer of them fit the curves' control points in the least squares sense (2.82), which is what
+// kinked, noisy curves want.
 //
 // Units        millimetres; u in [0, 1], v as the curves have it
-// Accuracy     the solution of the equations within 4 m p eps times the condition number of [N] (m curves, degree p), of
-//              the largest coordinate. With averaged knots it interpolates; a surface of degree p in u comes back.
+// Accuracy     the solution of the equations within 4 m p eps times the condition number of [N] (m curves,
+//              degree p), of the largest coordinate. With averaged knots it interpolates; a surface of degree
+//              p in u comes back.
 // Cost         m p (p + 3 n) for n control points a curve
 // Allocation   what is returned, and the triangle of the equations
 // Failure      LoftError; see there
@@ -46,8 +48,8 @@ struct Loft {
   Pivots pivots{};
 };
 
-// The mean chord-length parameters of the rows of first and of last points (2.70). A row without length, where all
-// curves meet in one point, has no say.
+// The mean chord-length parameters of the rows of first and of last points (2.70). A row without length,
+// where all curves meet in one point, has no say.
 std::expected<std::vector<double>, LoftError> loft_parameters(std::span<const SpaceCurve> curves);
 
 // Knots averaged (interpolation) or balanced (approximation) over the u_k.

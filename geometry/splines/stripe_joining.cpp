@@ -62,8 +62,8 @@ struct Continuation {
   Foot foot;
 };
 
-// The stripe turned into the line's direction, and where it goes on from the line's end; nothing if it lies wholly
-// behind it.
+// The stripe turned into the line's direction, and where it goes on from the line's end; nothing if it lies
+// wholly behind it.
 std::optional<Continuation> continuation(Run line_end, const Stripe& stripe) {
   Continuation found{stripe, {}};
   if (direction(line_end).dot(stripe.back() - stripe.front()) < 0) std::ranges::reverse(found.stripe);

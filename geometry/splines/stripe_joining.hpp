@@ -1,17 +1,17 @@
-// Stripes of consecutive shots joined into lines that run across the whole plate, for lofting (thesis section 5.3.4:
-// "choose two stripes in the two consecutive shots which give the minimum distance and connect them").
+// Stripes of consecutive shots joined into lines that run across the whole plate, for lofting (thesis section
+// 5.3.4: "choose two stripes in the two consecutive shots which give the minimum distance and connect them").
 //
-// From shot to shot the nearest pair of a line and a stripe is joined, then the nearest of those that are left, and so
-// on. A distance is that from the line's end to the stripe, seen as a chain of chords, so that shots may overlap: what
-// a stripe has before the place nearest to the line's end is dropped. The direction in which a stripe was recorded
-// does not matter. What a joint costs in smoothness is told with it; the thesis found that joints kink, and that is why
-// lofting also approximates.
+// From shot to shot the nearest pair of a line and a stripe is joined, then the nearest of those that are
+// left, and so on. A distance is that from the line's end to the stripe, seen as a chain of chords, so that
+// shots may overlap: what a stripe has before the place nearest to the line's end is dropped. The direction
+// in which a stripe was recorded does not matter. What a joint costs in smoothness is told with it; the
+// thesis found that joints kink, and that is why lofting also approximates.
 //
 // Units        millimetres, radians; world coordinates
 // Cost         every point of a shot is visited once for each line: lines * points a shot
 // Allocation   what is returned, and a table of lines * stripes
-// Failure      JoinError: too_few_points (no shot, a shot without stripes, a stripe of fewer than 2 points), not_finite,
-//              repeated_points. Stripes that find no partner are no error: they are counted.
+// Failure      JoinError: too_few_points (no shot, a shot without stripes, a stripe of fewer than 2 points),
+//              not_finite, repeated_points. Stripes that find no partner are no error: they are counted.
 #pragma once
 
 #include <Eigen/Geometry>

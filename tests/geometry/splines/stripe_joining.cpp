@@ -16,8 +16,8 @@ namespace {
 
 double height(double x, double y) { return 10 * std::sin(x / 90) * std::cos(y / 70); }
 
-// Stripes that run along x from `from` to `to`, 20 mm apart in y, as a scanner at this place would see them; `bend` is
-// how far they leave their y over 100 mm.
+// Stripes that run along x from `from` to `to`, 20 mm apart in y, as a scanner at this place would see them;
+// `bend` is how far they leave their y over 100 mm.
 StripesOfShot shot(double from, double to, int stripes, double offset_y = 0, double bend = 0) {
   StripesOfShot seen;
   for (int s = 0; s < stripes; ++s) {
@@ -95,7 +95,8 @@ TEST_CASE("a joint tells its kink and its step") {
 }
 
 TEST_CASE("the nearest pairs are joined first, and what is too far away stays alone") {
-  // The second shot lies 9 mm off in y: nearer to the neighbour's line at -11 mm is nobody, 9 mm are too many at 5.
+  // The second shot lies 9 mm off in y: nearer to the neighbour's line at -11 mm is nobody, 9 mm are too many
+  // at 5.
   const std::vector<StripesOfShot> shots{shot(0, 100, 3), shot(101, 200, 3, 9)};
   const auto strict = join_stripes(shots);
   REQUIRE(strict.has_value());
@@ -151,8 +152,9 @@ TEST_CASE("a plate is lofted from the stripes of its shots") {
   const auto through = loft(curves), near = loft(curves, {.control_points = 7});
   REQUIRE(through.has_value());
   REQUIRE(near.has_value());
-  // The truth is explicit, so a surface point says itself where it should be. A registration error of 0.05 mm at slopes
-  // below 0.15, and what cubics miss of this wave over spans of 25 and 50 mm: h^4 / 384 max |f''''| < 0.025 mm.
+  // The truth is explicit, so a surface point says itself where it should be. A registration error of 0.05 mm
+  // at slopes below 0.15, and what cubics miss of this wave over spans of 25 and 50 mm: h^4 / 384 max |f''''|
+  // < 0.025 mm.
   for (const Loft* lofted : {&*through, &*near}) {
     for (double u = 0; u <= 1; u += 0.04) {
       for (double v = 0; v <= 1; v += 0.05) {
