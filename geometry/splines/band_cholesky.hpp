@@ -37,7 +37,8 @@ class BandCholesky {
   int smallest_column() const { return pivots_.smallest_column; }
   int failed_column() const { return pivots_.failed_column; }  // -1: none
 
-  // One slice of L y = b, columns [first, end) in ascending order, and of L' x = y, in descending order; in place.
+  // One slice of L y = b, columns [first, end) in ascending order, and of L' x = y, in descending order; in
+  // place.
   void solve_lower(std::span<double> x, int first, int end) const;
   void solve_upper(std::span<double> x, int first, int end) const;
 
