@@ -16,7 +16,8 @@ enum class Error {
   knots_not_increasing,
   capacity,      // more data than the memory plan holds
   not_on_plate,  // the hint does not lie on anything that was measured
-  singular_parametrization,  // r_u x r_v vanishes: the surface has no tangent plane in this parametrization
+  // r_u x r_v vanishes: no tangent plane
+  singular_parametrization,
 };
 
 std::string_view to_string(Error) noexcept;

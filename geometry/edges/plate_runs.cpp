@@ -24,7 +24,8 @@ constexpr std::size_t trim_points = 3;   // as many points as a side wall leaves
 constexpr std::size_t runs_per_stripe = 40;
 constexpr std::size_t stripes_in_turn = 2;
 
-// The usual distance between neighbouring points near one end of a run, where perspective may have stretched it.
+// The usual distance between neighbouring points near one end of a run, where perspective may have stretched
+// it.
 double spacing_near_end(const StripeView& stripe, std::span<const std::uint32_t> good, bool at_last) {
   std::array<double, 21> sample;
   std::size_t count = 0;
@@ -68,8 +69,8 @@ std::size_t PlateRunFinder::bytes() const {
          found_.capacity() * sizeof(PlateRun) + first_run_.capacity() * sizeof(first_run_[0]);
 }
 
-// Walks along the next stripes in turn, then makes runs of each. What a walk finds lies apart until the stripes before
-// it are done: behind the room that they may take.
+// Walks along the next stripes in turn, then makes runs of each. What a walk finds lies apart until the
+// stripes before it are done: behind the room that they may take.
 bool PlateRunFinder::cut_in_turn(std::size_t count, const PlateRunSettings& settings) {
   std::array<StripeWalk, stripes_in_turn> walk;
   std::array<std::size_t, stripes_in_turn> good_at, pieces_at;
@@ -271,8 +272,8 @@ struct Neighbour {
          rise_mm = 0;  // to the next run on the stripe; how much higher it lies than this one goes on
 };
 
-// A stripe that reports every ray ends at the field's limit whatever the plate's height does to its width there;
-// one that leaves missing points out ends there by its position.
+// A stripe that reports every ray ends at the field's limit whatever the plate's height does to its width
+// there; one that leaves missing points out ends there by its position.
 bool at_field_limit(double y_outward, std::size_t rays_beyond, double spacing,
                     const PlateRunSettings& settings) {
   return static_cast<double>(rays_beyond) * spacing <= settings.field_margin_mm ||

@@ -6,12 +6,14 @@
 // bridged, an outlier skipped. At a jump the plate is the nearer (higher) side: a jump upwards is something
 // that lies on the plate or hides it, not the plate's edge.
 //
-// Frame        scanner coordinates (mm): stripes run along +y, follow one another along +x, z towards the scanner
-// Accuracy     an edge lies half a point spacing beyond the run's last good point, so without bias; standard deviation
-//              0.29 spacings along the stripe
+// Frame        scanner coordinates (mm): stripes run along +y, follow one another along +x, z towards the
+//              scanner
+// Accuracy     an edge lies half a point spacing beyond the run's last good point, so without bias; standard
+//              deviation 0.29 spacings along the stripe
 // Cost         O(points); 50,000 points in 100 stripes take about 0.4 ms (moldloft-bench edges)
 // Allocation   in the constructor only
-// Failure      Error::not_on_plate when the hint hits nothing, Error::capacity when the frame is larger than planned
+// Failure      Error::not_on_plate when the hint hits nothing, Error::capacity when the frame is larger than
+//              planned
 #pragma once
 
 #include <Eigen/Core>
@@ -69,8 +71,8 @@ class PlateRunFinder {
                                                        const Eigen::Vector3d& hint,
                                                        const PlateRunSettings& settings);
 
-  // The same in bounded pieces: begin(), cut_stripes() until it says true (4 us a stripe), finish(). The stripes are
-  // the caller's and must stay until then.
+  // The same in bounded pieces: begin(), cut_stripes() until it says true (4 us a stripe), finish(). The
+  // stripes are the caller's and must stay until then.
   std::expected<void, Error> begin(std::span<const StripeView> stripes);
   std::expected<bool, Error> cut_stripes(std::size_t at_most, const PlateRunSettings& settings);
   std::expected<std::span<const PlateRun>, Error> finish(const Eigen::Vector3d& hint,

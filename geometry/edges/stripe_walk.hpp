@@ -1,13 +1,14 @@
-// One stripe walked from point to point and cut into pieces where its height leaves the line so far. One or two points
-// that leave it and come back are outliers and skipped.
+// One stripe walked from point to point and cut into pieces where its height leaves the line so far. One or
+// two points that leave it and come back are outliers and skipped.
 //
-// It goes in steps, because each step waits for the result of the one before (a division and a dozen dependent operations
-// in the filter): stripes walked in turn wait together, and two take little longer than one.
+// It goes in steps, because each step waits for the result of the one before (a division and a dozen
+// dependent operations in the filter): stripes walked in turn wait together, and two take little longer than
+// one.
 //
 // Units        mm
 // Cost         about 12 ns a point alone, 7 ns when two stripes go in turn
-// Allocation   none; what is found goes where the constructor is told, one index a good point and one piece for every
-//              `fewest_piece_points` points and one more
+// Allocation   none; what is found goes where the constructor is told, one index a good point and one piece
+//              for every `fewest_piece_points` points and one more
 #pragma once
 
 #include <algorithm>
@@ -63,9 +64,9 @@ class StripeWalk {
   std::uint32_t piece_count() const { return piece_count_; }
 
  private:
-  // A height that differs from the line so far by more than this many standard deviations does not continue it:
-  // with 50,000 points a frame, 5.5 lets one good point in a thousand frames go, and a point on the plate's
-  // side wall has to lie within 0.3 mm of the top to be taken for the plate.
+  // A height that differs from the line so far by more than this many standard deviations does not continue
+  // it: with 50,000 points a frame, 5.5 lets one good point in a thousand frames go, and a point on the
+  // plate's side wall has to lie within 0.3 mm of the top to be taken for the plate.
   static constexpr double jump_sigmas = 5.5;
   static constexpr double start_slope = 0.6;  // tan 31 degrees: what a line may be while its slope is unknown
   static constexpr double slope_doubt = 0.1;  // five standard deviations of a slope over the filter's memory
@@ -73,7 +74,8 @@ class StripeWalk {
   static constexpr int slope_known_after = 6;    // points
   static constexpr std::size_t outliers_in_a_row = 2;
 
-  // The stripe's usual distance between neighbouring points, from a sample of them; missing points do not count.
+  // The stripe's usual distance between neighbouring points, from a sample of them; missing points do not
+  // count.
   static double usual_spacing(const StripeView& stripe) {
     std::array<double, 31> sample;
     std::size_t count = 0;

@@ -1,5 +1,5 @@
-// moldloft-bench edges: the plate's edge in one shot. Ours (runs, boundary, line) beside the floor: reading the frame, and
-// the largest second difference of every stripe, the least that an edge detector can do.
+// moldloft-bench edges: the plate's edge in one shot. Ours (runs, boundary, line) beside the floor: reading
+// the frame, and the largest second difference of every stripe, the least that an edge detector can do.
 #include <fmt/core.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// Height maps that SICK ships with its samples (The Unlicense), where they are present beside the source tree. Every row is
-// one laser profile: rows are stripes, columns are points.
+// Height maps that SICK ships with its samples (The Unlicense), where they are present beside the source
+// tree. Every row is one laser profile: rows are stripes, columns are points.
 #pragma once
 
 #include <cmath>
