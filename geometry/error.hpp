@@ -39,6 +39,8 @@ enum class Error {
   open_loop,        // curves that should meet end to end do not
   wrong_way_round,  // a loop that has the face on its right
   off_surface,      // a curve that should lie on the surface does not
+  // r_u x r_v vanishes: no tangent plane
+  singular_parametrization,
 };
 
 std::string_view to_string(Error) noexcept;

@@ -6,50 +6,26 @@
 #include <limits>
 
 #include "geometry/edges/stripe_line.hpp"
+#include "geometry/edges/stripe_walk.hpp"
 
 namespace moldloft::geometry {
 
 namespace {
 
-// A height that differs from the line so far by more than this many standard deviations does not continue it:
-// with 50,000 points a frame, 5.5 lets one good point in a thousand frames go, and a point on the plate's
-// side wall has to lie within 0.3 mm of the top to be taken for the plate.
-constexpr double jump_sigmas = 5.5;
 constexpr double trim_sigmas =
     4.0;  // the last points of a run are looked at once more, against the points inside
 
 constexpr double start_slope =
     0.6;  // tan 31 degrees: what a line may turn out to be while its slope is unknown
-constexpr double slope_doubt = 0.1;     // five standard deviations of a slope over the filter's memory
-constexpr double curvature = 1.0 / 50;  // 1/mm, sharper than any bend that a gap may hide
-constexpr std::size_t outliers_in_a_row = 2;
 constexpr std::size_t line_points = 12;  // for lines at the ends of runs, as long as the filter's memory
 constexpr std::size_t trim_points = 3;   // as many points as a side wall leaves beyond an edge
 
 // Runs a stripe may hold on average: a field of 102 mm holds 34 of the shortest.
 constexpr std::size_t runs_per_stripe = 40;
-constexpr std::size_t fewest_points = 4;  // of a piece: fewer have no slope
+constexpr std::size_t stripes_in_turn = 2;
 
-bool is_good(const StripeView& stripe, std::size_t i) {
-  return std::isfinite(stripe.z[i]) && std::isfinite(stripe.y[i]) && std::isfinite(stripe.x[i]);
-}
-
-// The stripe's usual distance between neighbouring points, from a sample of them; missing points do not
-// count.
-double usual_spacing(const StripeView& stripe) {
-  std::array<double, 31> sample;
-  std::size_t count = 0;
-  const std::size_t stride = std::max<std::size_t>(1, stripe.y.size() / sample.size());
-  for (std::size_t i = 1; i < stripe.y.size() && count < sample.size(); i += stride) {
-    const double dy = stripe.y[i] - stripe.y[i - 1];
-    if (std::isfinite(dy) && dy > 0) sample[count++] = dy;
-  }
-  if (count == 0) return 0.2;
-  std::nth_element(sample.begin(), sample.begin() + count / 2, sample.begin() + count);
-  return sample[count / 2];
-}
-
-// The same near one end of a run, where perspective may have stretched it.
+// The usual distance between neighbouring points near one end of a run, where perspective may have stretched
+// it.
 double spacing_near_end(const StripeView& stripe, std::span<const std::uint32_t> good, bool at_last) {
   std::array<double, 21> sample;
   std::size_t count = 0;
@@ -64,16 +40,7 @@ double spacing_near_end(const StripeView& stripe, std::span<const std::uint32_t>
   return sample[count / 2];
 }
 
-double allowed_jump(const PlateRunSettings& settings, double dy, bool slope_known) {
-  const double noise = std::max(jump_sigmas * settings.noise_mm, 0.1 * settings.min_step_mm);
-  return noise + (slope_known ? slope_doubt : start_slope) * dy + 0.5 * curvature * dy * dy;
-}
-
 }  // namespace
-
-struct PlateRunFinder::Piece {
-  std::uint32_t begin, count;  // in good_
-};
 
 struct PlateRunFinder::Run {
   std::uint32_t begin, count;  // in good_
@@ -86,7 +53,8 @@ struct PlateRunFinder::Run {
 PlateRunFinder::PlateRunFinder(std::size_t max_stripes, std::size_t max_points)
     : max_stripes_(max_stripes), max_points_(max_points) {
   good_.reserve(max_points);
-  pieces_.reserve(max_points / fewest_points + 1);
+  pieces_.reserve(max_points / fewest_piece_points + 1);
+  walked_.resize(max_points / fewest_piece_points + stripes_in_turn);
   runs_.reserve(max_stripes * runs_per_stripe);
   found_.reserve(max_stripes * runs_per_stripe);
   first_run_.reserve(max_stripes + 1);
@@ -96,74 +64,52 @@ PlateRunFinder::~PlateRunFinder() = default;
 PlateRunFinder::PlateRunFinder(PlateRunFinder&&) noexcept = default;
 
 std::size_t PlateRunFinder::bytes() const {
-  return good_.capacity() * sizeof(good_[0]) + pieces_.capacity() * sizeof(Piece) +
-         runs_.capacity() * sizeof(Run) + found_.capacity() * sizeof(PlateRun) +
-         first_run_.capacity() * sizeof(first_run_[0]);
+  return good_.capacity() * sizeof(good_[0]) +
+         (pieces_.capacity() + walked_.capacity()) * sizeof(StripePiece) + runs_.capacity() * sizeof(Run) +
+         found_.capacity() * sizeof(PlateRun) + first_run_.capacity() * sizeof(first_run_[0]);
 }
 
-// Walks along one stripe and cuts it where the height leaves the line so far. One or two points that leave it
-// and come back are outliers and skipped.
-void PlateRunFinder::cut_stripe(const StripeView& stripe, const PlateRunSettings& settings) {
-  const double spacing = usual_spacing(stripe);
-  const std::size_t size = stripe.z.size();
-  HeightFilter filter;
-  double y_before = 0;
-
-  const auto fits = [&](std::size_t i) {
-    const double dy = std::max(0.0, stripe.y[i] - y_before);
-    return std::abs(stripe.z[i] - filter.predict(stripe.y[i])) <=
-           allowed_jump(settings, dy, filter.count() >= 6);
-  };
-  const auto next_good = [&](std::size_t i) {
-    for (++i; i < size && !is_good(stripe, i);) ++i;
-    return i;
-  };
-  const auto take = [&](std::size_t i) {
-    good_.push_back(static_cast<std::uint32_t>(i));
-    ++pieces_.back().count;
-    y_before = stripe.y[i];
-  };
-  const auto start = [&](std::size_t i) {
-    if (!pieces_.empty() && pieces_.back().count < fewest_points) {
-      good_.resize(pieces_.back().begin);
-      pieces_.pop_back();
-    }
-    pieces_.push_back({static_cast<std::uint32_t>(good_.size()), 0});
-    filter.restart(stripe.y[i], stripe.z[i]);
-    take(i);
-  };
-
-  std::size_t i = is_good(stripe, 0) ? 0 : next_good(0);
-  if (i < size) start(i);
-  while ((i = next_good(i)) < size) {
-    if (stripe.y[i] - y_before > settings.bridge_mm) {
-      start(i);
-    } else if (fits(i)) {
-      filter.update(stripe.y[i], stripe.z[i], spacing);
-      take(i);
-    } else {
-      // The line is taken up again if the point after the outliers fits, and the one after that confirms it.
-      std::size_t back = i;
-      for (std::size_t skipped = 0; skipped < outliers_in_a_row && back < size; ++skipped) {
-        back = next_good(back);
-        if (back < size && fits(back)) break;
-      }
-      const bool returns = back < size && stripe.y[back] - y_before <= settings.bridge_mm && fits(back);
-      const std::size_t after = returns ? next_good(back) : size;
-      if (!returns || (after < size && !fits(after))) {
-        start(i);
-      } else {
-        i = back;
-        filter.update(stripe.y[i], stripe.z[i], spacing);
-        take(i);
-      }
+// Walks along the next stripes in turn, then makes runs of each. What a walk finds lies apart until the
+// stripes before it are done: behind the room that they may take.
+bool PlateRunFinder::cut_in_turn(std::size_t count, const PlateRunSettings& settings) {
+  std::array<StripeWalk, stripes_in_turn> walk;
+  std::array<std::size_t, stripes_in_turn> good_at, pieces_at;
+  std::size_t good_end = good_.size(), pieces_end = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t points = stripes_[next_stripe_ + k].z.size();
+    good_at[k] = good_end, pieces_at[k] = pieces_end;
+    good_end += points, pieces_end += points / fewest_piece_points + 1;
+  }
+  const std::size_t begin = good_.size();
+  good_.resize(good_end);  // within what is reserved: no stripe leaves more indices than it has points
+  for (std::size_t k = 0; k < count; ++k)
+    walk[k] = StripeWalk(stripes_[next_stripe_ + k], settings, &good_[good_at[k]], &walked_[pieces_at[k]]);
+  if (count == stripes_in_turn) {
+    static_assert(stripes_in_turn == 2);
+    while (walk[0].step() && walk[1].step()) {
     }
   }
+  for (std::size_t k = 0; k < count; ++k) {
+    while (walk[k].step()) {
+    }
+  }
+
+  std::size_t kept = begin;
+  for (std::size_t k = 0; k < count; ++k, ++next_stripe_) {
+    std::copy_n(good_.begin() + good_at[k], walk[k].good_count(), good_.begin() + kept);
+    pieces_.assign(walked_.begin() + pieces_at[k], walked_.begin() + pieces_at[k] + walk[k].piece_count());
+    for (StripePiece& piece : pieces_) piece.begin += static_cast<std::uint32_t>(kept);
+    kept += walk[k].good_count();
+    first_run_.push_back(static_cast<std::uint32_t>(runs_.size()));
+    if (!keep_runs(static_cast<std::uint16_t>(next_stripe_), stripes_[next_stripe_], settings)) return false;
+  }
+  good_.resize(kept);
+  return true;
 }
 
 void PlateRunFinder::drop_short_pieces(const StripeView& stripe, std::size_t min_points,
                                        double min_length_mm) {
-  std::erase_if(pieces_, [&](const Piece& piece) {
+  std::erase_if(pieces_, [&](const StripePiece& piece) {
     const double length = stripe.y[good_[piece.begin + piece.count - 1]] - stripe.y[good_[piece.begin]];
     return piece.count < min_points || length < min_length_mm;
   });
@@ -175,8 +121,8 @@ void PlateRunFinder::join_pieces(const StripeView& stripe, const PlateRunSetting
   if (pieces_.empty()) return;
   std::size_t kept = 0;
   for (std::size_t k = 1; k < pieces_.size(); ++k) {
-    Piece& before = pieces_[kept];
-    const Piece& after = pieces_[k];
+    StripePiece& before = pieces_[kept];
+    const StripePiece& after = pieces_[k];
     const std::span<const std::uint32_t> good(good_);
     const auto tail =
         good.subspan(before.begin, before.count).last(std::min<std::size_t>(before.count, line_points));
@@ -200,7 +146,7 @@ void PlateRunFinder::join_pieces(const StripeView& stripe, const PlateRunSetting
 // The first points beyond an edge may have slipped in while the line still allowed them: compare the
 // outermost three with the line through the points inside them.
 void PlateRunFinder::trim_ends(const StripeView& stripe, const PlateRunSettings& settings) {
-  for (Piece& piece : pieces_) {
+  for (StripePiece& piece : pieces_) {
     if (piece.count < line_points + trim_points) continue;
     const auto good = std::span<const std::uint32_t>(good_).subspan(piece.begin, piece.count);
     const double n = line_points;
@@ -231,13 +177,13 @@ void PlateRunFinder::trim_ends(const StripeView& stripe, const PlateRunSettings&
 
 bool PlateRunFinder::keep_runs(std::uint16_t stripe_index, const StripeView& stripe,
                                const PlateRunSettings& settings) {
-  drop_short_pieces(stripe, fewest_points, 0.15 * settings.min_run_mm);  // walls are steep, so short
+  drop_short_pieces(stripe, fewest_piece_points, 0.15 * settings.min_run_mm);  // walls are steep, so short
   join_pieces(stripe, settings);
-  drop_short_pieces(stripe, fewest_points, settings.min_run_mm);
+  drop_short_pieces(stripe, fewest_piece_points, settings.min_run_mm);
   join_pieces(stripe, settings);
   trim_ends(stripe, settings);
   if (runs_.size() + pieces_.size() > runs_.capacity()) return false;
-  for (const Piece& piece : pieces_) {
+  for (const StripePiece& piece : pieces_) {
     const auto id = static_cast<std::uint32_t>(runs_.size());
     runs_.push_back({.begin = piece.begin,
                      .count = piece.count,
@@ -326,8 +272,8 @@ struct Neighbour {
          rise_mm = 0;  // to the next run on the stripe; how much higher it lies than this one goes on
 };
 
-// A stripe that reports every ray ends at the field's limit whatever the plate's height does to its width there;
-// one that leaves missing points out ends there by its position.
+// A stripe that reports every ray ends at the field's limit whatever the plate's height does to its width
+// there; one that leaves missing points out ends there by its position.
 bool at_field_limit(double y_outward, std::size_t rays_beyond, double spacing,
                     const PlateRunSettings& settings) {
   return static_cast<double>(rays_beyond) * spacing <= settings.field_margin_mm ||
@@ -370,12 +316,8 @@ std::expected<void, Error> PlateRunFinder::begin(std::span<const StripeView> str
 std::expected<bool, Error> PlateRunFinder::cut_stripes(std::size_t at_most,
                                                        const PlateRunSettings& settings) {
   const std::size_t end = std::min(stripes_.size(), next_stripe_ + at_most);
-  for (; next_stripe_ < end; ++next_stripe_) {
-    const StripeView& stripe = stripes_[next_stripe_];
-    first_run_.push_back(static_cast<std::uint32_t>(runs_.size()));
-    pieces_.clear();
-    if (!stripe.z.empty()) cut_stripe(stripe, settings);
-    if (!keep_runs(static_cast<std::uint16_t>(next_stripe_), stripe, settings))
+  while (next_stripe_ < end) {
+    if (!cut_in_turn(std::min(stripes_in_turn, end - next_stripe_), settings))
       return std::unexpected(Error::capacity);
   }
   return next_stripe_ == stripes_.size();

@@ -6,12 +6,14 @@
 // bridged, an outlier skipped. At a jump the plate is the nearer (higher) side: a jump upwards is something
 // that lies on the plate or hides it, not the plate's edge.
 //
-// Frame        scanner coordinates (mm): stripes run along +y, follow one another along +x, z towards the scanner
-// Accuracy     an edge lies half a point spacing beyond the run's last good point, so without bias; standard deviation
-//              0.29 spacings along the stripe
-// Cost         O(points); 50,000 points in 100 stripes take about 0.5 ms
+// Frame        scanner coordinates (mm): stripes run along +y, follow one another along +x, z towards the
+//              scanner
+// Accuracy     an edge lies half a point spacing beyond the run's last good point, so without bias; standard
+//              deviation 0.29 spacings along the stripe
+// Cost         O(points); 50,000 points in 100 stripes take about 0.4 ms (moldloft-bench edges)
 // Allocation   in the constructor only
-// Failure      Error::not_on_plate when the hint hits nothing, Error::capacity when the frame is larger than planned
+// Failure      Error::not_on_plate when the hint hits nothing, Error::capacity when the frame is larger than
+//              planned
 #pragma once
 
 #include <Eigen/Core>
@@ -23,6 +25,8 @@
 #include "geometry/error.hpp"
 
 namespace moldloft::geometry {
+
+struct StripePiece;  // a stretch of one stripe before stretches are joined
 
 struct StripeView {  // columns of equal length, ordered along +y; NaN where a point is missing
   std::span<const float> x, y, z;
@@ -67,8 +71,8 @@ class PlateRunFinder {
                                                        const Eigen::Vector3d& hint,
                                                        const PlateRunSettings& settings);
 
-  // The same in bounded pieces: begin(), cut_stripes() until it says true (6 us a stripe), finish(). The stripes are
-  // the caller's and must stay until then.
+  // The same in bounded pieces: begin(), cut_stripes() until it says true (4 us a stripe), finish(). The
+  // stripes are the caller's and must stay until then.
   std::expected<void, Error> begin(std::span<const StripeView> stripes);
   std::expected<bool, Error> cut_stripes(std::size_t at_most, const PlateRunSettings& settings);
   std::expected<std::span<const PlateRun>, Error> finish(const Eigen::Vector3d& hint,
@@ -79,10 +83,9 @@ class PlateRunFinder {
  private:
   std::span<const StripeView> stripes_;  // of the frame at hand
   std::size_t next_stripe_ = 0;
-  struct Run;    // a stretch of good points on one stripe, linked into its region
-  struct Piece;  // a stretch of one stripe before stretches are joined
+  struct Run;  // a stretch of good points on one stripe, linked into its region
 
-  void cut_stripe(const StripeView&, const PlateRunSettings&);
+  bool cut_in_turn(std::size_t count, const PlateRunSettings&);  // false when there are too many runs
   void join_pieces(const StripeView&, const PlateRunSettings&);
   void drop_short_pieces(const StripeView&, std::size_t min_points, double min_length_mm);
   void trim_ends(const StripeView&, const PlateRunSettings&);
@@ -92,7 +95,8 @@ class PlateRunFinder {
   std::uint32_t region_of(std::uint32_t run) const;
 
   std::vector<std::uint32_t> good_;  // indices of good points, stripe after stripe; runs are stretches of it
-  std::vector<Piece> pieces_;        // of the stripe at hand
+  std::vector<StripePiece> walked_;  // of the stripes that are walked in turn
+  std::vector<StripePiece> pieces_;  // of the stripe at hand
   std::vector<Run> runs_;            // of the whole frame, in order of stripe and y
   std::vector<std::uint32_t> first_run_;  // of every stripe, and one past the end
   std::vector<PlateRun> found_;

@@ -62,9 +62,9 @@ class HeightFilter {
   void update(double y, double z, double spacing) {
     const double dy = y - y_, residual = z - predict(y);
     count_ = std::min(count_ + 1, memory);
-    const Gains gains = gains_for(count_);
-    level_ = z - (1 - gains.level) * residual;
-    slope_ = std::clamp(slope_ + gains.slope * residual / std::max(dy, spacing), -max_slope, max_slope);
+    const Gains& gain = gains[count_];
+    level_ = z - (1 - gain.level) * residual;
+    slope_ = std::clamp(slope_ + gain.slope * residual / std::max(dy, spacing), -max_slope, max_slope);
     y_ = y;
   }
 
@@ -75,9 +75,12 @@ class HeightFilter {
   struct Gains {
     double level, slope;
   };
-  static constexpr Gains gains_for(int n) {
-    return {2.0 * (2 * n - 1) / (n * (n + 1.0)), 6.0 / (n * (n + 1.0))};
-  }
+  // By the number of points taken: two divisions less for every point of a frame.
+  static constexpr std::array<Gains, memory + 1> gains = [] {
+    std::array<Gains, memory + 1> table{};
+    for (int n = 1; n <= memory; ++n) table[n] = {2.0 * (2 * n - 1) / (n * (n + 1.0)), 6.0 / (n * (n + 1.0))};
+    return table;
+  }();
 
   double y_ = 0, level_ = 0, slope_ = 0;
   int count_ = 0;

@@ -105,8 +105,8 @@ void NetEquations::add(const LiveBasis& basis, const Eigen::Matrix3d& weight, co
 
 template <typename Visit>
 void NetEquations::for_each_energy_cell(double length_u, double length_v, const Visit& visit) const {
-  // f_xx^2 + 2 f_xy^2 + f_yy^2 with x = length_u u, y = length_v v, times a length to the fourth that drops out of the
-  // ratio to the data.
+  // f_xx^2 + 2 f_xy^2 + f_yy^2 with x = length_u u, y = length_v v, times a length to the fourth that drops
+  // out of the ratio to the data.
   const double ratio = length_u / length_v, uu = 1 / (ratio * ratio), vv = ratio * ratio;
   for (std::size_t s = 0; s < rough_u_.size(); ++s) {
     for (std::size_t t = 0; t < rough_v_.size(); ++t) {

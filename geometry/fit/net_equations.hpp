@@ -1,12 +1,12 @@
-// Normal equations of a bicubic net over any clamped knots, whose control points' coordinates may be coupled: what a fit
-// needs that weighs a residual differently in different directions of space.
+// Normal equations of a bicubic net over any clamped knots, whose control points' coordinates may be coupled:
+// what a fit needs that weighs a residual differently in different directions of space.
 //
-// Minimises sum_k S(u_k)' Q_k S(u_k) + 2 S(u_k)' l_k over the free control points, S the surface of the unknowns; for
-// residuals r_k that S is to take away l_k = Q_k r_k. With block 1 the weights Q are multiples of the identity and the
-// three coordinates share one matrix; with block 3 they are symmetric 3 x 3 matrices.
+// Minimises sum_k S(u_k)' Q_k S(u_k) + 2 S(u_k)' l_k over the free control points, S the surface of the
+// unknowns; for residuals r_k that S is to take away l_k = Q_k r_k. With block 1 the weights Q are multiples
+// of the identity and the three coordinates share one matrix; with block 3 they are symmetric 3 x 3 matrices.
 //
-// Cost         add: 136 block^2 multiply-adds a point; solve: see band_cholesky.hpp, half band block (3 n + 4) - 1 for
-//              n free control points in the shorter direction
+// Cost         add: 136 block^2 multiply-adds a point; solve: see band_cholesky.hpp, half band block (3 n +
+//              4) - 1 for n free control points in the shorter direction
 // Allocation   in the constructor only
 // Failure      solve() returns false where a pivot is not positive
 #pragma once

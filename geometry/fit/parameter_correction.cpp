@@ -14,16 +14,17 @@ namespace {
 
 using Eigen::Matrix3d, Eigen::Vector2d, Eigen::Vector3d;
 
-// Damping of the net's step, relative to the data's own weight. It starts where a step is nearly a point-distance one,
-// falls by ten when the model was right and grows by four when it was wrong; below the least the tangential directions
-// would leave the matrix without positive pivots, above the largest a step moves the surface by rounding.
+// Damping of the net's step, relative to the data's own weight. It starts where a step is nearly a
+// point-distance one, falls by ten when the model was right and grows by four when it was wrong; below the
+// least the tangential directions would leave the matrix without positive pivots, above the largest a step
+// moves the surface by rounding.
 constexpr double first_damping = 1e-2, least_damping = 1e-9, largest_damping = 1e4;
 constexpr double damping_falls = 0.1, damping_grows = 4;
 constexpr double good_model = 0.5, poor_model = 0.1;  // achieved over promised reduction
 constexpr int settled_rounds = 3;
 
-// Smallest over largest pivot of the fit at given parameters, below which the data leave the net open somewhere: sixteen
-// stripes on eleven control points show 0.1, one stripe too few 1e-16.
+// Smallest over largest pivot of the fit at given parameters, below which the data leave the net open
+// somewhere: sixteen stripes on eleven control points show 0.1, one stripe too few 1e-16.
 constexpr double determined = 1e-10;
 
 constexpr int foot_steps = 12;          // Newton: 2 or 3 beside the foot
@@ -53,8 +54,8 @@ Foot see(const SurfacePoint& at, const Vector3d& point, const Vector2d& uv, cons
   return foot;
 }
 
-// The Newton step of the parameters towards the foot, in the directions that are free; Gauss-Newton where the Hessian
-// does not show a minimum.
+// The Newton step of the parameters towards the foot, in the directions that are free; Gauss-Newton where the
+// Hessian does not show a minimum.
 Vector2d newton_step(const SurfacePoint& at, const Foot& foot) {
   const double gu = foot.free_u ? at.du.dot(foot.residual) : 0.0,
                gv = foot.free_v ? at.dv.dot(foot.residual) : 0.0;
@@ -83,7 +84,8 @@ Foot settle(const BSplineSurface& surface, const Vector3d& point, const Vector2d
   for (int step = 0; step < foot_steps; ++step) {
     const Vector2d full = newton_step(at, foot);
     if (!full.allFinite()) break;
-    // Near the foot the distance is flat and its fall drowns in rounding: there the slant tells whether to go on.
+    // Near the foot the distance is flat and its fall drowns in rounding: there the slant tells whether to go
+    // on.
     const bool near = slant(foot) <= flat_share * foot.squared;
     bool better = false;
     double share = 1;
@@ -100,7 +102,8 @@ Foot settle(const BSplineSurface& surface, const Vector3d& point, const Vector2d
   return foot;
 }
 
-// What of a residual the parameters cannot take away: the projection off the tangent directions that are free.
+// What of a residual the parameters cannot take away: the projection off the tangent directions that are
+// free.
 Matrix3d stands_off(const Foot& foot) {
   Matrix3d weight = Matrix3d::Identity();
   if (foot.free_u && foot.free_v) {

@@ -9,8 +9,8 @@ namespace moldloft::geometry {
 
 namespace {
 
-// The sine below which parameter lines count as touching, and the share of the second derivatives below which a first
-// derivative is rounding: at 1e-10 curvatures still carry six digits, and what lies below is a pole.
+// The sine below which parameter lines count as touching, and the share of the second derivatives below which
+// a first derivative is rounding: at 1e-10 curvatures still carry six digits, and what lies below is a pole.
 constexpr double least_sine = 1e-10;
 constexpr double least_speed = 1e-10;
 
@@ -57,7 +57,8 @@ std::expected<Frame, Error> frame_of(const Derivatives& p) {
   return frame;
 }
 
-// With t1 = r_u / |r_u| and t2 = (r_v - s r_u) / q, s = F / E, q = area / |r_u|, the second form gives the entries.
+// With t1 = r_u / |r_u| and t2 = (r_v - s r_u) / q, s = F / E, q = area / |r_u|, the second form gives the
+// entries.
 Shape shape_of(const Frame& frame) {
   const FundamentalForms& w = frame.forms;
   const double s = w.f / w.e, inverse_area = 1 / frame.area;
@@ -104,7 +105,8 @@ std::expected<Curvature, Error> curvature_at(const SurfacePoint& point, double u
 
 namespace {
 
-// The control points of the curve r(u, .) and of its u derivatives, for one fixed u: a row of nodes shares them.
+// The control points of the curve r(u, .) and of its u derivatives, for one fixed u: a row of nodes shares
+// them.
 class NetAlong {
  public:
   explicit NetAlong(const BSplineSurface& surface)

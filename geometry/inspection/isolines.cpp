@@ -58,8 +58,8 @@ std::expected<void, Error> check(const ScalarGrid& grid, double level) {
   return {};
 }
 
-// For every edge that a line leaves behind on its way: the edge it goes to. With the larger values on the left a line
-// enters a cell where it left the neighbour, so the pieces of all cells join by themselves.
+// For every edge that a line leaves behind on its way: the edge it goes to. With the larger values on the
+// left a line enters a cell where it left the neighbour, so the pieces of all cells join by themselves.
 struct Links {
   std::vector<std::uint32_t> next;
   std::vector<bool> has_previous;
@@ -74,8 +74,9 @@ void link_cell(const std::array<double, 4>& corner, const std::array<std::uint32
     above |= static_cast<unsigned>(corner[k] >= level) << k;
   }
   if (above == 0 || above == 15) return;
-  // Walking counter-clockwise the cell is on the left. A line that comes in through an edge has the edge's first corner
-  // on its left, so it comes in where the walk falls below the level and leaves where the walk rises above it.
+  // Walking counter-clockwise the cell is on the left. A line that comes in through an edge has the edge's
+  // first corner on its left, so it comes in where the walk falls below the level and leaves where the walk
+  // rises above it.
   std::array<unsigned, 2> in{}, out{};
   unsigned ins = 0, outs = 0;
   for (unsigned k = 0; k < 4; ++k) {
@@ -88,16 +89,17 @@ void link_cell(const std::array<double, 4>& corner, const std::array<std::uint32
     links.has_previous[edge[to]] = true;
   };
   if (ins == 1) return link(in[0], out[0]);
-  // Two opposite corners above. If the saddle of the bilinear interpolant is above too, they are joined and the lines
-  // cut off the corners below, each from its fall to the rise after it. Otherwise they cut off the corners above.
+  // Two opposite corners above. If the saddle of the bilinear interpolant is above too, they are joined and
+  // the lines cut off the corners below, each from its fall to the rise after it. Otherwise they cut off the
+  // corners above.
   const double saddle =
       (corner[0] * corner[2] - corner[1] * corner[3]) / (corner[0] + corner[2] - corner[1] - corner[3]);
   const bool joined = saddle >= level;
   for (const unsigned from : in) link(from, joined ? (from + 1) % 4 : (from + 3) % 4);
 }
 
-// Follows one line from its first edge. Vertices that fall together on a node become one; a line that is nothing but
-// one node is none.
+// Follows one line from its first edge. Vertices that fall together on a node become one; a line that is
+// nothing but one node is none.
 void follow(const Edges& edges, double level, std::uint32_t start, bool closed, Links& links, Isolines& out) {
   Isoline line{static_cast<std::uint32_t>(out.vertices.size()), 0, closed};
   for (std::uint32_t edge = start; edge != none;) {
@@ -214,8 +216,8 @@ std::expected<std::vector<Eigen::Vector3d>, Error> isoparametric_line(const BSpl
   for (std::size_t k = cubic; k + cubic + 1 < knots.size(); ++k) {
     const double from = knots[k], step = knots[k + 1] - from;
     if (!(step > 0)) continue;
-    // The second derivative is linear on a span, so its largest size is at an end; taken from inside the span, since a
-    // knot may break it.
+    // The second derivative is linear on a span, so its largest size is at an end; taken from inside the
+    // span, since a knot may break it.
     const BasisValues ends[2] = {cubic_basis(knots, static_cast<int>(k), from),
                                  cubic_basis(knots, static_cast<int>(k), knots[k + 1])};
     double bend = 0;

@@ -11,8 +11,12 @@
 namespace moldloft::bench {
 
 // Each in a file of its own, bench/NAME.cpp.
+Json run_edges(const Options&);
+
 std::span<const Benchmark> all_benchmarks() {
-  static const std::vector<Benchmark> all{};
+  static const std::vector<Benchmark> all{
+      {"edges", "the plate's edge in one shot", run_edges},
+  };
   return all;
 }
 

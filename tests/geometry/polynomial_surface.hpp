@@ -1,5 +1,5 @@
-// A bicubic polynomial map of the unit square as a B-spline surface, exactly, over any knots: for tests whose truth is
-// the polynomial.
+// A bicubic polynomial map of the unit square as a B-spline surface, exactly, over any knots: for tests whose
+// truth is the polynomial.
 #pragma once
 
 #include <Eigen/LU>

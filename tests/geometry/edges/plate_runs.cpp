@@ -6,8 +6,8 @@
 #include <cmath>
 #include <string>
 
-#include "geometry/heap_watch.hpp"
 #include "geometry/edges/stripe_scene.hpp"
+#include "geometry/heap_watch.hpp"
 
 using namespace moldloft;
 using geometry::Error, geometry::PlateRun, geometry::PlateRunFinder, geometry::PlateRunSettings,
@@ -220,4 +220,34 @@ TEST_CASE("finding runs takes no memory and less than a tick") {
   CHECK(after == before);
   MESSAGE("50,000 points: " << least << " ms, " << finder.bytes() << " bytes");
   CHECK(least < 20);  // an unoptimized build under a sanitizer is allowed to be slow
+}
+
+TEST_CASE("a frame cut in any portions, stripes of unequal length included, gives the same runs") {
+  StripeScene scene = edge_across();
+  scene.wall_points = 2, scene.shadow_mm = 3, scene.drop_outs = 0.05, scene.outliers = 0.02;
+  test::Frame frame = sample(scene);
+  for (std::size_t s = 0; s < frame.views.size(); s += 3) {  // some short, one empty
+    const std::size_t kept = s == 30 ? 0 : 300 + s;
+    frame.views[s] = {frame.views[s].x.first(kept), frame.views[s].y.first(kept),
+                      frame.views[s].z.first(kept)};
+  }
+  PlateRunFinder finder(100, 50'000);
+  const auto whole = finder.find(frame.views, {0, -20, 0}, {});
+  REQUIRE(whole.has_value());
+  REQUIRE(whole->size() >= 98);
+  const std::vector<PlateRun> truth(whole->begin(), whole->end());
+  for (const std::size_t portion : {1, 2, 3, 7}) {
+    REQUIRE(finder.begin(frame.views).has_value());
+    for (bool done = false; !done;) done = finder.cut_stripes(portion, {}).value();
+    const auto runs = finder.finish({0, -20, 0}, {});
+    REQUIRE(runs.has_value());
+    REQUIRE(runs->size() == truth.size());
+    for (std::size_t k = 0; k < truth.size(); ++k) {
+      CHECK((*runs)[k].stripe == truth[k].stripe);
+      CHECK((*runs)[k].first == truth[k].first);
+      CHECK((*runs)[k].last == truth[k].last);
+      CHECK((*runs)[k].edge_first == truth[k].edge_first);
+      CHECK((*runs)[k].edge_last == truth[k].edge_last);
+    }
+  }
 }

@@ -98,9 +98,9 @@ TEST_CASE("the net's equations have the dense solution, coordinates coupled or n
 }
 
 TEST_CASE("the fairing energy is the integral of the squared second derivatives") {
-  // With no data but one heavy point each at the four corners and the middle, the faired net of x, y, z is the one of
-  // least energy through them; instead of that the energy itself is compared here: the net that the equations move by a
-  // tiny step from `base` goes along minus its gradient.
+  // With no data but one heavy point each at the four corners and the middle, the faired net of x, y, z is
+  // the one of least energy through them; instead of that the energy itself is compared here: the net that
+  // the equations move by a tiny step from `base` goes along minus its gradient.
   BSplineSurface base{{0, 0, 0, 0, 0.3, 1, 1, 1, 1}, {0, 0, 0, 0, 0.5, 0.6, 1, 1, 1, 1}, {}, {}, {}};
   std::mt19937 random(8);
   std::normal_distribution<double> normal;
@@ -122,8 +122,9 @@ TEST_CASE("the fairing energy is the integral of the squared second derivatives"
     };
     return (4 * rule(200) - rule(100)) / 3;
   };
-  // A unit weight on every control point would be the identity; a dense set of points does nearly the same job, so the
-  // solution is compared through the optimality condition instead: gradient of points' sum = - factor * gradient of energy.
+  // A unit weight on every control point would be the identity; a dense set of points does nearly the same
+  // job, so the solution is compared through the optimality condition instead: gradient of points' sum = -
+  // factor * gradient of energy.
   NetEquations equations(base.knots_u, base.knots_v, false, 1);
   std::uniform_real_distribution<double> unit(0, 1);
   std::vector<Vector2d> at;

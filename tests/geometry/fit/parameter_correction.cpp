@@ -15,8 +15,8 @@ using Eigen::Vector2d, Eigen::Vector3d;
 
 namespace {
 
-// Waves in the manner of the thesis (section 6.2.1): 11 x 11 control points over eight spans, x and y of their own so
-// that x depends on u alone and y on v alone.
+// Waves in the manner of the thesis (section 6.2.1): 11 x 11 control points over eight spans, x and y of
+// their own so that x depends on u alone and y on v alone.
 enum class Wave { egg_crate, diagonal, strong };
 
 BSplineSurface wave(Wave kind) {
@@ -92,8 +92,8 @@ double inverse(const auto& increasing, double value) {
   return 0.5 * (low + high);
 }
 
-// Mean over 50 x 50 points of the height of the fitted surface above the true one at the same place: the truth is a graph
-// whose x depends on u alone, so no projection is needed. The distance is no larger.
+// Mean over 50 x 50 points of the height of the fitted surface above the true one at the same place: the
+// truth is a graph whose x depends on u alone, so no projection is needed. The distance is no larger.
 double mean_height_off(const BSplineSurface& fitted, const BSplineSurface& truth) {
   double sum = 0;
   for (int i = 0; i < 50; ++i) {
@@ -262,8 +262,8 @@ TEST_CASE(
   const auto fit = fit_with_parameter_correction(points, rough, truth);
   REQUIRE(fit.has_value());
   check_falls(fit->report);
-  // The truth is one of the candidates, so the least sum is not above its own; and no fit can eat more of the noise than
-  // its unknowns: one direction of 2,000 points against 8 x 7 control points of three coordinates.
+  // The truth is one of the candidates, so the least sum is not above its own; and no fit can eat more of the
+  // noise than its unknowns: one direction of 2,000 points against 8 x 7 control points of three coordinates.
   const double truth_rms = std::sqrt(along_normal / 2000);
   CHECK(fit->report.rms_mm <= truth_rms);
   CHECK(fit->report.rms_mm >= truth_rms * std::sqrt(1 - 3 * 56 / 2000.0) * 0.95);

@@ -179,9 +179,10 @@ TEST_CASE("a sphere is umbilic everywhere") {
 }
 
 TEST_CASE("a bicubic that follows a sphere to its fourth order curves like it within the remainder") {
-  // The sphere is z = R - r^2/2R - (r^4)/8R^3 - ..., of which a bicubic takes all but x^4 + y^4: second derivatives are
-  // off by 12 a^2 / 8 R^3 = 1.5 (a/R)^2 / R at most, slopes by (a/R)^3 / 2, which matters a hundred times less. 3 % stands
-  // for the higher orders: r^6 / 16 R^5 adds 72 a^4 / 16 R^5, and the slopes 2 (a/R) (a/R)^3 / R.
+  // The sphere is z = R - r^2/2R - (r^4)/8R^3 - ..., of which a bicubic takes all but x^4 + y^4: second
+  // derivatives are off by 12 a^2 / 8 R^3 = 1.5 (a/R)^2 / R at most, slopes by (a/R)^3 / 2, which matters a
+  // hundred times less. 3 % stands for the higher orders: r^6 / 16 R^5 adds 72 a^4 / 16 R^5, and the slopes 2
+  // (a/R) (a/R)^3 / R.
   const double radius = 250;
   for (const double half : {5.0, 10.0}) {
     const auto cap = height_surface(
@@ -229,7 +230,8 @@ TEST_CASE("Gaussian curvature does not change when a surface is bent without str
     const double u = 0.6, v = 0.2;
     double before = 0;
     for (const double a : {1.0, 0.8, 0.5}) {
-      // Profile a cos u, angle v / a, height with slope sqrt(1 - a^2 sin^2 u): the metric is that of the unit sphere.
+      // Profile a cos u, angle v / a, height with slope sqrt(1 - a^2 sin^2 u): the metric is that of the unit
+      // sphere.
       const double c = std::cos(v / a), s = std::sin(v / a),
                    z = std::sqrt(1 - a * a * std::sin(u) * std::sin(u));
       const double cu = std::cos(u), su = std::sin(u);
@@ -275,7 +277,8 @@ TEST_CASE("curvature is the same wherever the surface stands and however it is p
     CHECK(std::abs(here->k2 - again->k2) <= allowed);
     CHECK(std::abs(std::abs(here->tangent_1.dot(again->tangent_1)) - 1) < 1e-9);
 
-    // Exchanging u and v turns the normal over: the sign of H and of the principal curvatures, but not that of K.
+    // Exchanging u and v turns the normal over: the sign of H and of the principal curvatures, but not that
+    // of K.
     const auto turned = curvature_at({p.value, p.dv, p.du, p.dvv, p.duv, p.duu});
     CHECK(std::abs(turned->k1 + here->k2) <= 2 * bound(p));
     CHECK(std::abs(turned->mean + here->mean) <= 2 * bound(p));

@@ -55,13 +55,14 @@ TEST_CASE(
     REQUIRE(lines->lines.size() == 1);
     const Isoline line = lines->lines[0];
     CHECK(line.closed);
-    // Along an edge the second derivative is 0.02 / mm: linear crossings miss the level by cell^2 / 8 of that.
+    // Along an edge the second derivative is 0.02 / mm: linear crossings miss the level by cell^2 / 8 of
+    // that.
     for (const Isolines::Vertex& vertex : lines->vertices) {
       CHECK(std::abs(height(vertex.uv.x(), vertex.uv.y()) - level) <= 0.02 * cell_mm * cell_mm / 8 + 1e-14);
     }
     refine_isolines(*lines, height, level);
-    // The slope is at most 0.02 * 50 * sqrt(2) * 100 mm a unit of the domain; 25 mm is the net's size, 16 eps the
-    // surface's rounding.
+    // The slope is at most 0.02 * 50 * sqrt(2) * 100 mm a unit of the domain; 25 mm is the net's size, 16 eps
+    // the surface's rounding.
     const double allowed = 8 * eps * 142 + 16 * eps * 72;
     for (const Isolines::Vertex& vertex : lines->vertices) {
       CHECK(std::abs(height(vertex.uv.x(), vertex.uv.y()) - level) <= allowed);
@@ -70,8 +71,8 @@ TEST_CASE(
     const auto ring = on_surface(bowl, *lines, line);
     CHECK(ring.size() == line.count + 1);
     CHECK(ring.front() == ring.back());
-    // A polygon on the circle; no chord is longer than a cell's diagonal, and a chord d is short of its arc by d^3/24R^2,
-    // to which the higher orders add less than a tenth of it.
+    // A polygon on the circle; no chord is longer than a cell's diagonal, and a chord d is short of its arc
+    // by d^3/24R^2, to which the higher orders add less than a tenth of it.
     const double circle = 2 * std::numbers::pi * radius,
                  share = 2 * cell_mm * cell_mm / (24 * radius * radius);
     CHECK(length_of(ring) <= circle * (1 + 1e-12));
@@ -96,9 +97,9 @@ TEST_CASE("lines that leave the domain are open and end on its border") {
 TEST_CASE(
     "two opposite corners above the level are joined where the saddle is above it, and parted where it is "
     "below") {
-  // f = (u - a)(v - b) is bilinear, so its hyperbolas are known, and so is on which branch every vertex lies. The saddle
-  // (value 0) lies off the cell's middle, where the field is worth a b: a level between the two is what tells a
-  // decision by the saddle from one by the middle.
+  // f = (u - a)(v - b) is bilinear, so its hyperbolas are known, and so is on which branch every vertex lies.
+  // The saddle (value 0) lies off the cell's middle, where the field is worth a b: a level between the two is
+  // what tells a decision by the saddle from one by the middle.
   const double a = 0.2, b = 0.3;
   for (const double turn : {1.0, -1.0}) {
     const auto field = [&](double u, double v) { return turn * (u - a) * (v - b); };
@@ -221,7 +222,8 @@ TEST_CASE("refined vertices lie on the level as exactly as the parameter can say
     evaluations = 0;
     refine_isolines(*lines, counted, level);
     CHECK(evaluations < 16 * static_cast<int>(lines->vertices.size()));
-    // The largest slope along u or v is 9.1; the field's own rounding is a few eps of 1.1 and of the angles 9 and 7.
+    // The largest slope along u or v is 9.1; the field's own rounding is a few eps of 1.1 and of the angles 9
+    // and 7.
     for (const auto& vertex : lines->vertices) {
       CHECK(std::abs(egg(vertex.uv.x(), vertex.uv.y()) - level) <= 8 * eps * 9.1 + 4 * eps * (1.1 + 9));
     }
@@ -245,8 +247,8 @@ TEST_CASE(
     REQUIRE(lines->lines.size() == 1);
     CHECK(lines->lines[0].closed);
     const double radius = std::tan(angle) / bend;
-    // d(cos angle)/d radius is bend sin cos^2: what the cosine's rounding of 4 eps leaves open of the radius, and as much
-    // again for the parameter.
+    // d(cos angle)/d radius is bend sin cos^2: what the cosine's rounding of 4 eps leaves open of the radius,
+    // and as much again for the parameter.
     const double allowed = 8 * eps / (bend * std::sin(angle) * std::pow(std::cos(angle), 2)) + 8 * eps * 120;
     for (const Vector3d& p : on_surface(bowl, *lines, lines->lines[0])) {
       CHECK(std::abs(p.head<2>().norm() - radius) <= allowed);
