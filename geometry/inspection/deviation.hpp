@@ -9,7 +9,7 @@
 //              before while the points come close together, else from a global search: right in any order,
 //              fast in the order of the scan
 // Frame        points are carried by `design_from_plate` to the surface's frame; mm
-// Accuracy     deviations within 1e-12 mm, feet within 1e-6 mm along the surface, for plates within 1e4 mm of
+// Accuracy     deviations within 1e-11 mm, feet within 1e-6 mm along the surface, for plates within 1e4 mm of
 //              the origin
 // Cost         0.1..0.25 us a point within 20 mm of an explicit surface; a summary 20 ns a point
 // Allocation   none

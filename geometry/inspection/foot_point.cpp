@@ -21,7 +21,7 @@ struct Enough {
   double short_step_mm;  // longer ones are evaluated in any case
 };
 constexpr Enough exact{1e-13, 10, 1e-4};
-constexpr Enough by_distance{1e-6, 0, 0.02};
+constexpr Enough by_distance{1e-6, 0, 0.01};
 
 constexpr double almost_singular = 1e-6;  // of the Hessian, relative to the metric
 

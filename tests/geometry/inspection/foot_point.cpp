@@ -91,7 +91,7 @@ TEST_CASE("feet are as orthogonal 10 m from the origin") {
   }
 }
 
-TEST_CASE("a foot by distance lies within 1e-6 mm of the true one, and its distance within 1e-12 mm") {
+TEST_CASE("a foot by distance lies within 1e-6 mm of the true one, and its distance within 1e-11 mm") {
   const PreparedSurface fast = prepared(yard_plate());
   std::mt19937 random(6);
   std::uniform_real_distribution<double> inside(5, 300), height(-40, 40);
@@ -101,7 +101,8 @@ TEST_CASE("a foot by distance lies within 1e-6 mm of the true one, and its dista
     const FootPoint exact = foot_near(fast, p, guess.u, guess.v);
     const FootPoint quick = foot_near(fast, p, guess.u, guess.v, FootAccuracy::by_distance);
     CHECK((exact.point - quick.point).norm() < 1e-6);
-    CHECK(std::abs(exact.signed_mm - quick.signed_mm) < 1e-12);
+    // The last step, 0.01 mm at the most, is expanded to second order: 14 / 80^3 / mm^2 * 0.01^3 / 6 is left.
+    CHECK(std::abs(exact.signed_mm - quick.signed_mm) < 1e-11);
     CHECK(quick.steps <= exact.steps);
   }
 }
@@ -116,7 +117,7 @@ TEST_CASE("the nearest foot beats every sample of a surface that folds over itse
       const Vector3d p(number(random), number(random), number(random));
       const NearestFoot nearest = nearest_foot(fast, p);
       CHECK(nearest.gap_mm <= 1.001e-6);
-      CHECK(nearest.foot.distance_mm <= sampled_distance(surface, p, 150) + nearest.gap_mm);
+      CHECK(nearest.foot.distance_mm <= sampled_distance(surface, p, 150) + nearest.gap_mm + 1e-12);
       // ... and it is a place of the surface.
       const Vector3d there = surface.at(nearest.foot.u, nearest.foot.v).value;
       CHECK((there - nearest.foot.point).norm() < 1e-11);
