@@ -11,6 +11,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int most_steps = 40;
+constexpr double eps = std::numeric_limits<double>::epsilon();
 constexpr double certain_mm = 1e-6;  // what a box could hide at the most where the search lets it go
 
 // When a step is the last one.
@@ -20,7 +21,9 @@ struct Enough {
   double short_step_mm;  // longer ones are evaluated in any case
 };
 constexpr Enough exact{1e-13, 10, 1e-4};
-constexpr Enough by_distance{1e-6, 0, 0.02};
+constexpr Enough by_distance{1e-6, 0, 0.01};
+
+constexpr double almost_singular = 1e-6;  // of the Hessian, relative to the metric
 
 struct Rectangle {
   double u0, u1, v0, v1;
@@ -79,6 +82,16 @@ inline void least_of_model(double huu, double huv, double hvv, double gu, double
   }
 }
 
+// Where the Hessian is not positive, beyond a centre of curvature, its negative direction is turned round by a multiple
+// of the metric: steps stay as long as Newton's, and lead down from a saddle.
+inline void step_downhill(const Slope& s, double u, double v, const Rectangle& r, double& du, double& dv) {
+  if (!(s.a > 0) || !(s.c > 0)) return;  // a pole, where a direction of the surface vanishes
+  const double huu = s.huu / s.a, hvv = s.hvv / s.c, huv = s.huv / std::sqrt(s.a * s.c);
+  const double least = 0.5 * (huu + hvv - std::hypot(huu - hvv, 2 * huv));
+  const double shift = 0.01 - 2 * std::min(least, 0.0);
+  least_of_model(s.huu + shift * s.a, s.huv, s.hvv + shift * s.c, s.gu, s.gv, u, v, r, du, dv);
+}
+
 // Where a descent has come to. The last short step is not evaluated any more: (du, dv) lead from where
 // `slope` was taken to (u, v), and `offset` and `square` are those of (u, v).
 struct Place {
@@ -119,14 +132,26 @@ inline Place descend(const Lanes& p, double u, double v, const Rectangle& r, con
   double before = 0;  // squared length of the previous step, mm^2
   while (place.steps < most_steps) {
     const Slope& s = place.slope;
-    const double det = s.huu * s.hvv - s.huv * s.huv;
-    const bool newton = s.huu > 0 && det > 1e-6 * (s.a * s.c);
-    double du, dv;
-    if (newton) {
-      least_of_model(s.huu, s.huv, s.hvv, s.gu, s.gv, place.u, place.v, r, du, dv);
+    // Pressed against a bound a parameter stays there, and the other one alone has an equation to solve.
+    const bool held_u = (place.u == r.u0 && s.gu > 0) || (place.u == r.u1 && s.gu < 0);
+    const bool held_v = (place.v == r.v0 && s.gv > 0) || (place.v == r.v1 && s.gv < 0);
+    bool newton = true;
+    double du = 0, dv = 0;
+    if (held_u || held_v) {
+      if (!held_v) {
+        newton = s.hvv > almost_singular * s.c;
+        dv = std::clamp(-s.gv / (newton ? s.hvv : s.c), r.v0 - place.v, r.v1 - place.v);
+      } else if (!held_u) {
+        newton = s.huu > almost_singular * s.a;
+        du = std::clamp(-s.gu / (newton ? s.huu : s.a), r.u0 - place.u, r.u1 - place.u);
+      }
     } else {
-      // A trace of the diagonal keeps the matrix regular where the surface's directions fall together.
-      least_of_model(s.a * (1 + 1e-9), s.b, s.c * (1 + 1e-9), s.gu, s.gv, place.u, place.v, r, du, dv);
+      newton = s.huu > 0 && s.huu * s.hvv - s.huv * s.huv > almost_singular * (s.a * s.c);
+      if (newton) {
+        least_of_model(s.huu, s.huv, s.hvv, s.gu, s.gv, place.u, place.v, r, du, dv);
+      } else {
+        step_downhill(s, place.u, place.v, r, du, dv);
+      }
     }
     const double square = s.a * du * du + 2 * s.b * du * dv + s.c * dv * dv;
     if (!(square > 0)) {
@@ -136,8 +161,8 @@ inline Place descend(const Lanes& p, double u, double v, const Rectangle& r, con
     double next_u = moved(place.u, du, r.u0, r.u1), next_v = moved(place.v, dv, r.v0, r.v1);
     const SpanPolynomial* next_span = &span_of(next_u, next_v);
 
-    // Newton's steps shrink like rate * length^2: when the one after this would be below the accuracy, this one is
-    // taken on the expansion already at hand, which is good to length^3.
+    // Newton's steps shrink like rate * length^2: when the one after this would be below the accuracy, this
+    // one is taken on the expansion already at hand, which is good to length^3.
     if (newton && next_span == span && square < enough.short_step_mm * enough.short_step_mm) {
       double rate = enough.first_rate > 0 ? enough.first_rate : 2 * span->newton_rate;
       if (before > 0) rate = std::max(4 * std::sqrt(square) / before, 1e-2);
@@ -151,7 +176,7 @@ inline Place descend(const Lanes& p, double u, double v, const Rectangle& r, con
     Slope next = slope_of(*next_span, p, next_u, next_v);
     ++place.steps;
     // Of steps too short to be seen in the distance the equations alone can judge.
-    const bool unseen = newton && square < 1e-12;
+    const bool unseen = newton && square < 1e-12 + 64 * eps * s.square;
     double share = 1;
     while (!unseen && !(next.square <= s.square) && place.steps < most_steps) {
       share *= 0.5;
@@ -273,9 +298,10 @@ class Search {
     const SpanPolynomial& span = surface_.span(i, j);
     const Box& box = surface_.box(0, i, j);
     if (surface_.bounds(i, j).convex_within(reach(box))) return solve_convex(span, r);
-    BezierNet net;
-    surface_.bezier_net(i, j, net);
-    split(net, span, r, 0);
+    Piece whole{{}, r, 0};
+    surface_.bezier_net(i, j, whole.net);
+    whole.lower = lower_square(whole.net);
+    split(whole, span, 0);
   }
 
   double reach(const Box& box) const {
@@ -297,11 +323,32 @@ class Search {
     if (!place.converged) least_ = std::min(least_, lowest);
   }
 
-  void split(const BezierNet& net, const SpanPolynomial& span, const Rectangle& r, int depth) {
-    const Box box = box_of(net);
-    if (!worth_looking(box.squared_distance(p_))) return;
-    const double reach_here = reach(box);
-    if (bounds_of(net, r.u1 - r.u0, r.v1 - r.v0).convex_within(reach_here)) return solve_convex(span, r);
+  // No point of the net's hull is nearer than its least share along the direction to its middle. Of a piece that faces
+  // the point this misses the second order of the piece's size, a box the first.
+  double lower_square(const BezierNet& net) const {
+    const double by_box = box_of(net).squared_distance(p_);
+    const Vector3d towards = 0.25 * (net[1][1] + net[1][2] + net[2][1] + net[2][2]) - p_;
+    const double length = towards.norm();
+    if (!(length > 0)) return by_box;
+    double least = std::numeric_limits<double>::infinity();
+    for (const auto& row : net) {
+      for (const Vector3d& b : row) least = std::min(least, (b - p_).dot(towards));
+    }
+    const double by_hull = std::max(0.0, least / length * (1 - 16 * eps));
+    return std::max(by_box, by_hull * by_hull);
+  }
+
+  struct Piece {
+    BezierNet net;
+    Rectangle r;
+    double lower;
+  };
+
+  void split(const Piece& piece, const SpanPolynomial& span, int depth) {
+    if (!worth_looking(piece.lower)) return;
+    const Rectangle& r = piece.r;
+    if (bounds_of(piece.net, r.u1 - r.u0, r.v1 - r.v0).convex_within(reach(box_of(piece.net))))
+      return solve_convex(span, r);
     const double middle_u = 0.5 * (r.u0 + r.u1), middle_v = 0.5 * (r.v0 + r.v1);
     if (depth == 0) {  // a descent from here makes the pieces that follow easier to leave alone
       take(descend(lanes_, middle_u, middle_v, r, exact,
@@ -310,19 +357,25 @@ class Search {
       take(Place(middle_u, middle_v, slope_of(span, lanes_, middle_u, middle_v)));
     }
     if (depth >= most_depth || !spend()) {
-      least_ = std::min(least_, box.squared_distance(p_));
+      least_ = std::min(least_, piece.lower);
       return;
     }
     BezierNet low, high;
-    for (int j = 0; j < 4; ++j) halve_along_u(net, low, high, j);
-    const BezierNet* halves[2] = {&low, &high};
-    const Rectangle bounds[2] = {{r.u0, middle_u, r.v0, r.v1}, {middle_u, r.u1, r.v0, r.v1}};
-    for (int k = 0; k < 2; ++k) {
-      BezierNet left, right;
-      for (int i = 0; i < 4; ++i) halve((*halves[k])[i], left[i], right[i]);
-      split(left, span, {bounds[k].u0, bounds[k].u1, r.v0, middle_v}, depth + 1);
-      split(right, span, {bounds[k].u0, bounds[k].u1, middle_v, r.v1}, depth + 1);
+    for (int j = 0; j < 4; ++j) halve_along_u(piece.net, low, high, j);
+    Piece quarters[4];
+    for (int i = 0; i < 4; ++i) {
+      halve(low[i], quarters[0].net[i], quarters[1].net[i]);
+      halve(high[i], quarters[2].net[i], quarters[3].net[i]);
     }
+    int order[4] = {0, 1, 2, 3};
+    for (int k = 0; k < 4; ++k) {
+      quarters[k].r = {k < 2 ? r.u0 : middle_u, k < 2 ? middle_u : r.u1, k % 2 == 0 ? r.v0 : middle_v,
+                       k % 2 == 0 ? middle_v : r.v1};
+      quarters[k].lower = lower_square(quarters[k].net);
+      for (int m = k; m > 0 && quarters[order[m]].lower < quarters[order[m - 1]].lower; --m)
+        std::swap(order[m], order[m - 1]);
+    }
+    for (const int k : order) split(quarters[k], span, depth + 1);
   }
 
   static void halve(const Vector3d (&row)[4], Vector3d (&left)[4], Vector3d (&right)[4]) {

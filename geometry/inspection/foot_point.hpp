@@ -43,8 +43,8 @@ struct FootPoint {
   int steps = 0;  // surface evaluations
 };
 
-// How near to the true foot: `exact` as stated above; `by_distance` within 1e-6 mm along the surface, which leaves
-// distances right to 1e-12 mm (they are least there) and saves a step.
+// How near to the true foot: `exact` as stated above; `by_distance` within 1e-6 mm along the surface, which
+// leaves distances of a plate right to 1e-11 mm (they are least there) and saves a step.
 enum class FootAccuracy : std::uint8_t { exact, by_distance };
 
 // The local foot that descends from (u, v).

@@ -55,8 +55,8 @@ std::optional<LeastDistance> least_distance(std::span<const std::array<double, 6
   }
   if (scale == 0) return LeastDistance{};
 
-  // The last entry of the residual of the dual is -1 / (1 + |z|^2) in units of `unit`: with z of the order of 1 the
-  // division by it loses nothing.
+  // The last entry of the residual of the dual is -1 / (1 + |z|^2) in units of `unit`: with z of the order of
+  // 1 the division by it loses nothing.
   const double unit = scale;
   const auto column_of = [&](std::size_t i) {
     Column column;

@@ -1,10 +1,12 @@
 // Least distance programming: the shortest z with G z >= h, for few unknowns and any number of constraints.
 //
-// Source       Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23: the dual is a nonnegative least
-//              squares problem on the columns (g_i, h_i), solved by their active-set method (same chapter, NNLS)
-// Shapes       `rows` holds m rows of 6 numbers (zeros for fewer unknowns), `bounds` holds h; `open` (empty, or one a row)
-//              leaves out rows where it is 0
-// Accuracy     no constraint is broken by more than 1e-12 of the largest |h| or of |z|; rows should be of the order of 1
+// Source       Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23: the dual is a
+//              nonnegative least squares problem on the columns (g_i, h_i), solved by their active-set method
+//              (same chapter, NNLS)
+// Shapes       `rows` holds m rows of 6 numbers (zeros for fewer unknowns), `bounds` holds h; `open` (empty,
+//              or one a row) leaves out rows where it is 0
+// Accuracy     no constraint is broken by more than 1e-12 of the largest |h| or of |z|; rows should be of the
+//              order of 1
 // Cost         O(m) for each of some ten exchanges
 // Allocation   none
 // Failure      std::nullopt where the constraints contradict one another

@@ -21,8 +21,8 @@ constexpr double weak_ratio = 5;
 constexpr double penetration_mm = 1e-9;
 constexpr double least_damping = 1e-6, first_damping = 1e-3, most_damping = 1e6;
 
-// Fixed unknowns stay in the equations, uncoupled and stiffer than all the others together: their steps are zero, and
-// their eigenvalues come last.
+// Fixed unknowns stay in the equations, uncoupled and stiffer than all the others together: their steps are
+// zero, and their eigenvalues come last.
 struct FreeDirections {
   std::array<bool, 6> fixed;
   int count = 0;
@@ -51,8 +51,9 @@ struct FreeDirections {
   }
 };
 
-// Eigenvalues of a symmetric matrix, ascending, and its eigenvectors, by Jacobi's rotations (Golub and Van Loan, 8.5):
-// every rotation makes one pair of entries zero, and six sweeps leave nothing that a double could show.
+// Eigenvalues of a symmetric matrix, ascending, and its eigenvectors, by Jacobi's rotations (Golub and Van
+// Loan, 8.5): every rotation makes one pair of entries zero, and six sweeps leave nothing that a double could
+// show.
 struct Axes {
   Vector values;
   Square vectors = Square::Identity();
@@ -95,7 +96,8 @@ struct Axes {
 
 std::optional<InspectionError> fault_of(std::span<const Vector3d> points,
                                         const LocalizationSettings& settings, int free) {
-  // Three points fix a pose only together with the surface's curvature; six equations are the least there must be.
+  // Three points fix a pose only together with the surface's curvature; six equations are the least there
+  // must be.
   if (points.size() < static_cast<std::size_t>(std::max(3, free)))
     return InspectionError{Error::too_few_points};
   if (!settings.weights.empty() && settings.weights.size() != points.size())
@@ -271,8 +273,8 @@ class Alignment {
   }
 
   std::expected<Localization, InspectionError> result() {
-    // The covariance wants all points with their plain weights. The last pass saw the pose but for a step too short to
-    // matter, unless its weights were robust or there was nothing to settle.
+    // The covariance wants all points with their plain weights. The last pass saw the pose but for a step too
+    // short to matter, unless its weights were robust or there was nothing to settle.
     const bool seen = tukey_mm_ == 0 && sums_.points > 0;
     const PointPlaneSums sums = seen ? sums_ : system_.pass(pose_);
     Localization found;

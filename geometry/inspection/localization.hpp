@@ -1,56 +1,52 @@
-// Localization: the rigid motion that lays measured points on a design surface, how well it is determined, and on
-// request with all of the plate on one side.
+// Localization: the rigid motion that lays measured points on a design surface, how well it is determined,
+// and on request with all of the plate on one side.
 //
-// Problem      min sum w_i d_i^2 over design_from_plate, d_i the signed distance of point i to its true foot (thesis 6.4;
-//              sign as in foot_point.hpp). One-sided: the same with every d_i >= -tolerance (above) or <= tolerance
-//              (below): what a forming or machining allowance asks for
-// Method       Gauss-Newton on point-to-plane equations at true feet, undamped; a step after which the sum is larger is
-//              taken back and damped (Levenberg-Marquardt). One-sided: from there, a sequence of least distance programs
-//              on the linearized constraints (least_distance.hpp)
+// Problem      min sum w_i d_i^2 over design_from_plate, d_i the signed distance of point i to its true foot
+//              (thesis 6.4; sign as in foot_point.hpp). One-sided: the same with every d_i >= -tolerance
+//              (above) or <= tolerance (below): what a forming or machining allowance asks for
+// Method       Gauss-Newton on point-to-plane equations at true feet, undamped; a step after which the sum is
+//              larger is taken back and damped (Levenberg-Marquardt). One-sided: from there, a sequence of
+//              least distance programs on the linearized constraints (least_distance.hpp)
 // Frame        points in the plate's frame, the motion to the design's; mm, rad
-// Covariance   of the small motion (t, w) after the result, q -> c + exp([w])(q - c) + t, c the points' centroid in the
-//              design frame: t in mm first, then w in rad, about the design's axes. sigma^2 (J' W J)^-1, for a robust fit
-//              with Huber's factor for the biweight. Fixed directions have zero rows. Of a one-sided result: of the
-//              free fit's equations at that place, without regard to the contacts
-// Accuracy     stops when a step moves the points by less than `settled_mm` (rms); one-sided results break their bound by
-//              less than 1e-9 mm
+// Covariance   of the small motion (t, w) after the result, q -> c + exp([w])(q - c) + t, c the points'
+//              centroid in the design frame: t in mm first, then w in rad, about the design's axes. sigma^2
+//              (J' W J)^-1, for a robust fit with Huber's factor for the biweight. Fixed directions have zero
+//              rows. Of a one-sided result: of the free fit's equations at that place, without regard to the
+//              contacts
+// Accuracy     stops when a step moves the points by less than `settled_mm` (rms); one-sided results break
+//              their bound by less than 1e-9 mm
 // Cost         0.13 us a point and iteration; 3 to 8 iterations
 // Allocation   34 bytes a point, one-sided 90
 // Failure      InspectionError names the error and, for not_finite and negative weights, the point:
-//              too_few_points (fewer than 6, or than 3 free directions ask for), not_finite, collinear, undetermined_pose
-//              (a plane lets points slide: fix those directions), no_feasible_pose, not_converged
+//              too_few_points (fewer than 6, or than 3 free directions ask for), not_finite, collinear,
+//              undetermined_pose (a plane lets points slide: fix those directions), no_feasible_pose,
+//              not_converged
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <expected>
-#include <limits>
 #include <span>
 
-#include "geometry/error.hpp"
+#include "geometry/inspection/inspection_error.hpp"
 #include "geometry/inspection/point_plane_system.hpp"
 #include "geometry/inspection/prepared_surface.hpp"
 
 namespace moldloft::geometry {
-
-constexpr std::size_t no_point = std::numeric_limits<std::size_t>::max();
-
-struct InspectionError {
-  Error error;
-  std::size_t point = no_point;  // the one that is to blame
-};
 
 enum class AllowedSide { both, above, below };  // of the surface's normal
 
 struct LocalizationSettings {
   RigidMotion start = RigidMotion::Identity();  // a first design_from_plate; 40 degrees and 60 mm off will do
   std::span<const double> weights;  // empty: all 1. In units of 1 / variance if they are to mean that
-  // Directions in which the pose stays where the start has it: shifts along and small turns about the design's axes.
+  // Directions in which the pose stays where the start has it: shifts along and small turns about the
+  // design's axes.
   std::array<bool, 6> fixed{};
   bool robust = false;  // Tukey's biweight at 4.685 times the spread of the residuals (from their median)
   AllowedSide side = AllowedSide::both;
   double tolerance_mm = 0;  // by how much one-sided points may be on the other side
-  // A point that stands farther beyond the design's border than this is left out in the end: it has no partner there.
+  // A point that stands farther beyond the design's border than this is left out in the end: it has no
+  // partner there.
   double border_tolerance_mm = 0.5;
   double sigma_mm = 0;  // noise of a point of weight 1; 0: from the residuals
   double settled_mm = 1e-6;

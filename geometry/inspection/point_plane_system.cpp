@@ -3,6 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "geometry/inspection/plain_motion.hpp"
+
 namespace moldloft::geometry {
 
 namespace {
@@ -24,22 +26,6 @@ PointPlaneSystem::Moments moments_of(std::span<const Vector3d> points) {
   return {centroid, axes.eigenvalues(), std::sqrt(square.trace())};
 }
 
-// A 3 x 4 motion as plain numbers: the loop over the points is no place for checked access.
-struct Motion {
-  double r[3][3], t[3];
-  explicit Motion(const RigidMotion& motion) {
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) r[i][j] = motion.linear()(i, j);
-      t[i] = motion.translation()[i];
-    }
-  }
-  Vector3d operator()(const Vector3d& p) const {
-    const double x = p.x(), y = p.y(), z = p.z();
-    return {r[0][0] * x + r[0][1] * y + r[0][2] * z + t[0], r[1][0] * x + r[1][1] * y + r[1][2] * z + t[1],
-            r[2][0] * x + r[2][1] * y + r[2][2] * z + t[2]};
-  }
-};
-
 }  // namespace
 
 PointPlaneSystem::PointPlaneSystem(const PreparedSurface& design, std::span<const Vector3d> plate_points,
@@ -54,15 +40,15 @@ PointPlaneSystem::PointPlaneSystem(const PreparedSurface& design, std::span<cons
       takes_part_(plate_points.size(), 1) {}
 
 PointPlaneSums PointPlaneSystem::pass(const RigidMotion& design_from_plate, double tukey_mm) {
-  const Motion motion(design_from_plate);
-  const Vector3d centre = motion(moments_.centroid);
+  const PlainMotion motion(design_from_plate);
+  const Vector3d centre = motion * moments_.centroid;
   const double per_radius = 1 / moments_.radius;
   const bool by_plan = design_.is_explicit();
   PointPlaneSums sums;
   Pair normal[6][3] = {}, gradient[3] = {};
   double nx = 0, ny = 0, nz = 0;
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Vector3d q = motion(points_[i]);
+    const Vector3d q = motion * points_[i];
     FootPoint foot;
     if (by_plan) {
       const Parameters guess = design_.guess_of(q);

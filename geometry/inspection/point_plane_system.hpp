@@ -1,11 +1,12 @@
-// The equations of point to surface alignment: every point's signed distance at its true foot, linearized in a small
-// rigid motion, and summed to normal equations.
+// The equations of point to surface alignment: every point's signed distance at its true foot, linearized in
+// a small rigid motion, and summed to normal equations.
 //
 // Model        a point q (design frame) moves to c + exp([w]) (q - c) + t; its signed distance changes by
-//              n . t + ((q - c) x n) . w, n the surface's normal at the foot: exact to first order, since the foot moves
-//              along the surface only. Unknowns y = (t, radius w), all in mm: radius is the points' rms distance from c
-// Feet         by foot_near from the plan view's guess, or from the foot before where the surface has no plan view.
-//              Beyond the border the surface goes on as its tangent plane there
+//              n . t + ((q - c) x n) . w, n the surface's normal at the foot: exact to first order, since the
+//              foot moves along the surface only. Unknowns y = (t, radius w), all in mm: radius is the
+//              points' rms distance from c
+// Feet         by foot_near from the plan view's guess, or from the foot before where the surface has no plan
+//              view. Beyond the border the surface goes on as its tangent plane there
 // Cost         about 0.13 us a point near the surface
 // Allocation   feet(), rows() and the like are sized in the constructor; pass() allocates nothing
 // Determinism  sums run in the order of the points
@@ -55,8 +56,8 @@ class PointPlaneSystem {
   std::span<const std::array<double, 6>> rows() const { return rows_; }  // j; only after keep_rows()
   void keep_rows() { rows_.resize(points_.size()); }
 
-  // Leaves points out of all passes that follow: those which stand farther beyond the border than this after the last
-  // pass; those at which the last robust weight was zero. Return how many.
+  // Leaves points out of all passes that follow: those which stand farther beyond the border than this after
+  // the last pass; those at which the last robust weight was zero. Return how many.
   std::size_t leave_out_beyond(double overhang_mm);
   std::size_t leave_out_farther(double distance_mm);
   std::span<const std::uint8_t> taking_part() const { return takes_part_; }

@@ -47,8 +47,8 @@ struct SpanPolynomial {
   Lanes c[4][4];
   Lanes origin;
   double middle_u = 0, middle_v = 0;
-  // How fast Newton's steps to a foot on the span shrink at least: the next is about rate * length^2, in mm. From the
-  // first two derivatives; what curvature changes does at a distance is not in it.
+  // How fast Newton's steps to a foot on the span shrink at least: the next is about rate * length^2, in mm.
+  // From the first two derivatives; what curvature changes does at a distance is not in it.
   double newton_rate = 0;
 
   SurfaceJet at(double u, double v) const {
