@@ -11,8 +11,12 @@
 namespace moldloft::bench {
 
 // Each in a file of its own, bench/NAME.cpp.
+Json run_fit(const Options&);
+
 std::span<const Benchmark> all_benchmarks() {
-  static const std::vector<Benchmark> all{};
+  static const std::vector<Benchmark> all{
+      {"fit", "surface fit: floors, nets, choice of the net, bad data, growth", run_fit},
+  };
   return all;
 }
 
