@@ -7,8 +7,10 @@
 // adds: fill accumulators wherever the points are, merge them, and call fit_moments().
 //
 // Model        the unique minimum of sum w (z - f(u, v))^2 + fairing; x and y of the surface are u and v themselves
-// Net          control_u x control_v over equal spans; or knots_u, knots_v; or, with control_u == 0, nested nets of
-//              finest_spans x finest_spans down to 4 x 4 from one pass over the points, chosen by cross-validation
+// Net          control_u x control_v over equal spans; or knots_u, knots_v; or, with control_u == 0, chosen by
+//              cross-validation from one pass over the points: nested nets of finest_spans x finest_spans down to 4 x 4,
+//              then nets between the best of them and its neighbours, whose knots are some of the finest net's (where
+//              the points are at hand, one more pass spaces them evenly)
 // Accuracy     coefficients within 1e-11 of the heights' range of a dense QR solution; rms error against the truth
 //              sigma sqrt(N / M) for N control points and M points, where the net can follow the truth
 // Cost         450,000 points on 23 x 23: 3 ms (AVX-512); the choice among five nets 10 ms
@@ -63,6 +65,7 @@ struct FitReport {
   double condition = 0;                // estimate of the 1-norm condition of the normal equations, 0 unless asked for
   std::vector<NetScore> nets;          // all that were tried, from fine to coarse
   std::size_t chosen = 0;              // of them
+  double freedom = 0;                  // degrees of freedom of the surface: at most its control points
   int robust_passes = 0;
   double robust_sigma = 0;             // from the median residual
   std::size_t bytes = 0;               // what the fit held at most, above the caller's points

@@ -4,15 +4,15 @@
 
 #include <cassert>
 #include <cstddef>
-#include <span>
+#include <ranges>
 
 namespace moldloft::geometry {
 
 class Column {
  public:
   Column() = default;
-  Column(std::span<const double> values) : Column(values.data(), values.size()) {}
-  Column(std::span<const float> values) : Column(values.data(), values.size()) {}
+  template <std::ranges::contiguous_range Values>  // of double or float: vectors, spans, arrays
+  Column(const Values& values) : Column(std::ranges::data(values), std::ranges::size(values)) {}
   Column(const double* first, std::size_t size, std::ptrdiff_t stride = 1)  // stride in elements
       : doubles_(first), size_(size), stride_(stride) {}
   Column(const float* first, std::size_t size, std::ptrdiff_t stride = 1)

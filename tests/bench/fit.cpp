@@ -22,7 +22,7 @@ using geometry::FitSettings, geometry::FittedSurface, geometry::PointColumns;
 constexpr geometry::FitDomain plate{0, plate_mm, 0, plate_mm};
 
 PointColumns columns(const FitJob& job) {
-  return {.u = std::span{job.x}, .v = std::span{job.y}, .z = std::span{job.z}};
+  return {.u = job.x, .v = job.y, .z = job.z};
 }
 
 FittedSurface fit(const FitJob& job, FitSettings settings) {
@@ -120,8 +120,9 @@ Json nets(const FitJob& job, const Options& options, const Table& table) {
     row["rms_mm"] = error.rms, row["max_mm"] = error.max, row["bytes"] = ours.report.bytes;
     row["theory_rms_mm"] = theory, row["eigen_apart_mm"] = apart;
     out.push_back(row);
+    const std::string fitpack_words = fitpack_s ? fmt::format("{:.3f}", fitpack_s.value_or(0)) : "absent";
     table.line("  {:>3} x {:<3}{:>8.5f} {:>9.4f} {:>9} {:>7.1f} {:>10.3e} {:>10.3e} {:>10.3e} {:>9} {:>10.1e}", n, n,
-               our.median, eigen.median, fitpack_s ? fmt::format("{:.3f}", *fitpack_s) : "absent",
+               our.median, eigen.median, fitpack_words,
                eigen.median / our.median, error.rms, theory, error.max, ours.report.bytes, apart);
   }
   table.line("  field notes, same job: prototype 0.0029 / 0.0033 / 0.0153 s, Eigen 0.26 / 0.27 / 0.32,");
@@ -136,10 +137,10 @@ Json automatic(const FitJob& job, const Options& options, double fixed_s, const 
   Json out;
   out["n"] = chosen.surface.control_u(), out["seconds"] = taken.median, out["rms_mm"] = error.rms;
   out["times_fixed"] = taken.median / fixed_s;
-  table.line("\nnet chosen by cross-validation among five nested nets of one pass");
+  table.line("\nnet chosen by cross-validation among nets of one pass");
   for (const auto& net : chosen.report.nets) {
     table.line("  {:>2} x {:<2} spans  gcv {:.6e}  bic {:.1f}  sigma {:.6f}{}", net.spans_u, net.spans_v, net.gcv, net.bic,
-               net.sigma, net.spans_u + 3 == chosen.surface.control_u() ? "  <- chosen" : "");
+               net.sigma, net.spans_u == chosen.report.nets[chosen.report.chosen].spans_u ? "  <- chosen" : "");
   }
   table.line("  {} x {} in {:.4f} s = {:.1f} x the fixed 23 x 23 (asked: <= 10), rms {:.3e} mm (asked: <= 7e-4)",
              chosen.surface.control_u(), chosen.surface.control_v(), taken.median, taken.median / fixed_s, error.rms);
