@@ -40,6 +40,10 @@ std::string_view to_string(Error error) noexcept {
       return "the curves do not share one knot vector and degree";
     case Error::capacity:
       return "more data than the memory plan holds";
+    case Error::empty_cells:
+      return "cells of the net hold no points, and no fairing was asked for";
+    case Error::negative_weight:
+      return "a weight is negative";
     case Error::not_on_plate:
       return "nothing was measured where the plate was expected";
     case Error::too_few_stripes:

@@ -30,6 +30,76 @@ void MomentGrid::merge_row(int i, const MomentGrid& fine) {
   }
 }
 
+namespace {
+
+// A fine cell's share of its coarse cell, for gram and for load, with the eighth sum of a row left as it is.
+struct Share {
+  double six[7][7], three[4][4];
+};
+
+std::vector<Share> shares(std::span<const int> at) {
+  std::vector<Share> all;
+  for (std::size_t i = 0; i + 1 < at.size(); ++i) {
+    const double length = at[i + 1] - at[i];
+    for (int k = 0; k < at[i + 1] - at[i]; ++k) {
+      const auto six = restriction<6>(k / length, (k + 1) / length);
+      const auto three = restriction<3>(k / length, (k + 1) / length);
+      Share& share = all.emplace_back();
+      for (int p = 0; p < 7; ++p) std::copy(six[p].begin(), six[p].end(), share.six[p]);
+      for (int p = 0; p < 4; ++p) std::copy(three[p].begin(), three[p].end(), share.three[p]);
+    }
+  }
+  return all;
+}
+
+void add_rows(const Share& u, const CellMoments& in, CellMoments& out) {
+  for (int p = 0; p < 7; ++p) {
+    for (int l = 0; l < 7; ++l) {
+      for (int q = 0; q < 8; ++q) out.gram[8 * p + q] += u.six[p][l] * in.gram[8 * l + q];
+    }
+  }
+  for (int p = 0; p < 4; ++p) {
+    for (int l = 0; l < 4; ++l) {
+      for (int q = 0; q < 4; ++q) out.load[4 * p + q] += u.three[p][l] * in.load[4 * l + q];
+    }
+  }
+}
+
+void add_columns(const Share& v, const CellMoments& in, CellMoments& out) {
+  for (int p = 0; p < 7; ++p) {
+    for (int q = 0; q < 7; ++q) {
+      for (int m = 0; m < 7; ++m) out.gram[8 * p + q] += in.gram[8 * p + m] * v.six[q][m];
+    }
+    out.gram[8 * p + 7] += in.gram[8 * p + 7];
+  }
+  for (int p = 0; p < 4; ++p) {
+    for (int q = 0; q < 4; ++q) {
+      for (int m = 0; m < 4; ++m) out.load[4 * p + q] += in.load[4 * p + m] * v.three[q][m];
+    }
+  }
+}
+
+}  // namespace
+
+void MomentGrid::merge_blocks(const MomentGrid& fine, std::span<const int> at_u, std::span<const int> at_v) {
+  assert(static_cast<int>(at_u.size()) == cells_u_ + 1 && at_u.back() == fine.cells_u_);
+  assert(static_cast<int>(at_v.size()) == cells_v_ + 1 && at_v.back() == fine.cells_v_);
+  const std::vector<Share> u = shares(at_u), v = shares(at_v);
+  clear();
+  for (int i = 0; i < cells_u_; ++i) {
+    for (int j = 0; j < cells_v_; ++j) {
+      for (int b = at_v[j]; b < at_v[j + 1]; ++b) {
+        CellMoments column{};
+        for (int a = at_u[i]; a < at_u[i + 1]; ++a) {
+          add_rows(u[a], fine.cell(a, b), column);
+          points(i, j) += fine.points(a, b);
+        }
+        add_columns(v[b], column, cell(i, j));
+      }
+    }
+  }
+}
+
 void MomentGrid::add(const MomentGrid& other) {
   assert(other.cells_u_ == cells_u_ && other.cells_v_ == cells_v_);
   for (std::size_t k = 0; k < cells_.size(); ++k) {

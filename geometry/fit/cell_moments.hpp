@@ -10,6 +10,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "geometry/splines/bernstein.hpp"
@@ -63,6 +64,9 @@ class MomentGrid {
 
   // Fills row i of this grid from `fine`, whose cells are halves of this grid's cells in u, in v, or in both.
   void merge_row(int i, const MomentGrid& fine);
+  // Fills this grid from `fine`, cell (i, j) from the fine cells [at_u[i], at_u[i + 1]) x [at_v[j], at_v[j + 1]).
+  // Allocates for the restriction matrices.
+  void merge_blocks(const MomentGrid& fine, std::span<const int> at_u, std::span<const int> at_v);
   // Another grid's sums, same cells. What is taken away must have been added before.
   void add(const MomentGrid& other);
   void subtract(const MomentGrid& other);

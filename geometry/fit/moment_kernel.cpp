@@ -1,5 +1,6 @@
 #include "geometry/fit/moment_kernel.hpp"
 
+#include <array>
 #include <cassert>
 
 namespace moldloft::geometry {
@@ -70,7 +71,7 @@ constexpr auto& half3_columns = halves3.columns;
 namespace moldloft::geometry {
 
 #define MOLDLOFT_KERNEL(simd, name) \
-  {simd, name::locate, name::values, name::fold, name::fold_shot, name::merge, name::cell_gram}
+  {simd, name::locate, name::values, name::fold, name::fold_shot, name::heights, name::merge, name::cell_gram}
 
 const MomentKernel& moment_kernel(Simd simd) {
   assert(machine_has(simd));

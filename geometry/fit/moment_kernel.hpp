@@ -54,6 +54,8 @@ struct MomentKernel {
   void (*fold)(const PointBlock&, CellMoments* cells, std::uint32_t* counts);
   // The sums of w B3_i(s) B3_j(t) over the points [first, end), which lie in one cell.
   void (*fold_shot)(const PointBlock&, int first, int end, double* sixteen);
+  // The surface at every point, from its cell's 4 x 4 Bezier coefficients; the block is not weighted, its shot rows wanted.
+  void (*heights)(const PointBlock&, const std::array<double, 16>* bezier, double* out);
   // One cell from its halves, [u half][v half]; a direction that is not halved passes null for its second halves.
   void (*merge)(const CellMoments* const halves[4], CellMoments& whole);
   // The Gram matrix of the 16 functions that live on a cell, as SplineNet lays it out (CellMatrix): moments in rows of

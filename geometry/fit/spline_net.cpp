@@ -254,6 +254,22 @@ double SplineNet::energy(int cell_u, int cell_v, const CellMatrix& cell,
   return sum;
 }
 
+CellVector SplineNet::bezier(std::span<const double> coefficients, int cell_u, int cell_v) const {
+  const auto& eu = u_[cell_u].extraction;
+  const auto& ev = v_[cell_v].extraction;
+  const CellVector c = gather(coefficients, cell_u, cell_v);
+  CellVector half{}, out{};
+  for (int a = 0; a < 4; ++a) {
+    for (int j = 0; j < 4; ++j) {
+      for (int b = 0; b < 4; ++b) half[a * 4 + j] += ev[b][j] * c[a * 4 + b];
+    }
+    for (int i = 0; i < 4; ++i) {
+      for (int j = 0; j < 4; ++j) out[i * 4 + j] += eu[a][i] * half[a * 4 + j];
+    }
+  }
+  return out;
+}
+
 CellVector SplineNet::gather(std::span<const double> coefficients, int cell_u, int cell_v) const {
   const int i = u_[cell_u].first, j = v_[cell_v].first;
   CellVector out;

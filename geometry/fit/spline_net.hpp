@@ -87,6 +87,8 @@ class SplineNet {
   static double trace(const CellMatrix&);
   // c' M c for the 16 coefficients that live on a cell.
   double energy(int cell_u, int cell_v, const CellMatrix&, std::span<const double> coefficients) const;
+  // A cell's piece in Bernstein form: [4 i + j] with B3_i along u and B3_j along v.
+  CellVector bezier(std::span<const double> coefficients, int cell_u, int cell_v) const;
   // The 16 coefficients that live on a cell.
   CellVector gather(std::span<const double> coefficients, int cell_u, int cell_v) const;
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "geometry/fit/net_choice.hpp"
 #include "geometry/fit/net_solver.hpp"
 
 namespace moldloft::geometry {
@@ -15,22 +16,11 @@ namespace {
 
 constexpr int fewest_spans = 4;  // of a side as well: the nets must refine the sides' knots
 
-// Inflates the degrees of freedom in cross-validation (Kim and Gu 2004): what the shots' poses leave behind,
-// beside their offsets, is not independent from point to point, and plain cross-validation would spend
-// control points on it.
-constexpr double dof_inflation = 1.4;
-
 // Multiply-adds, about: of a cell from four, and of a shot's cell into a coarser one.
 constexpr double merge_cost = 2000, restrict_cost = 200;
 
 // A net is tried when it has at least this many points for every unknown.
 constexpr double points_an_unknown = 4;
-
-double generalized_cross_validation(const PointTotals& totals, const NetResult& result) {
-  const double n = static_cast<double>(totals.points);
-  const double free = 1 - dof_inflation * result.freedom / n;
-  return free > 0 ? result.squares / n / (free * free) : std::numeric_limits<double>::infinity();
-}
 
 struct Level {
   Level(int spans_u, int spans_v) : net(spans_u, spans_v) {
@@ -71,13 +61,13 @@ struct SurfaceFit::Work {
                3u * (std::min(s.max_spans_u, s.max_spans_v) + 3) + 3),
         shots(s.max_shots, s.max_spans_u, s.max_spans_v, shot_cells_planned(s),
               s.shot_sigma_mm > 0 ? (s.max_spans_u + 3u) * (s.max_spans_v + 3u) : 0) {
-    for (const auto& [u, v] : nested_nets(s.max_spans_u, s.max_spans_v)) {
-      levels.emplace_back(u, v);
-      moments.emplace_back(u, v);
+    for (const auto& [spans_u, spans_v] : nested_nets(s.max_spans_u, s.max_spans_v)) {
+      levels.emplace_back(spans_u, spans_v);
+      moments.emplace_back(spans_u, spans_v);
     }
   }
 
-  void fold(int shot);
+  void fold(int of_shot);
   void take_totals();
   void start_level();
   bool merge_some();
@@ -134,7 +124,7 @@ void SurfaceFit::begin(const PlanMap& map) {
 }
 
 // The block's heights and weights, and u and v, are there.
-void SurfaceFit::Work::fold(int shot) {
+void SurfaceFit::Work::fold(int of_shot) {
   if (block.count == 0) return;
   const MomentKernel& kernel = moment_kernel();
   MomentGrid& finest = moments.front();
@@ -142,7 +132,7 @@ void SurfaceFit::Work::fold(int shot) {
   kernel.locate(block, u.data(), v.data(), {nu, nv, double(nu), double(nv), 0, 0});
   kernel.values(block);
   kernel.fold(block, finest.cells(), finest.counts());
-  if (settings.shot_sigma_mm > 0) shots.add(shot, block);
+  if (settings.shot_sigma_mm > 0) shots.add(of_shot, block);
   totals.points += static_cast<std::uint64_t>(block.count);
   block.count = 0;
 }
@@ -217,15 +207,12 @@ void SurfaceFit::Work::take_totals() {
 void SurfaceFit::Work::start_level() {
   const Eigen::Vector2d across = map->at(1, 0.5).value - map->at(0, 0.5).value;
   const Eigen::Vector2d along = map->at(0.5, 1).value - map->at(0.5, 0).value;
-  solver.start({.net = &levels[level].net,
-                .moments = &moments[level],
-                .totals = totals,
-                .length_u_mm = across.norm(),
-                .length_v_mm = along.norm(),
-                .fairing = settings.fairing,
-                .shot_sigma_mm = settings.shot_sigma_mm,
-                .point_sigma_mm = point_sigma},
-               &shots);
+  NetTask task;
+  task.net = &levels[level].net, task.moments = &moments[level], task.totals = totals;
+  task.length_u_mm = across.norm(), task.length_v_mm = along.norm();
+  task.fairing = settings.fairing;
+  task.shot_sigma_mm = settings.shot_sigma_mm, task.point_sigma_mm = point_sigma;
+  solver.start(task, &shots);
   phase = Phase::solve;
 }
 

@@ -20,12 +20,6 @@
 
 namespace moldloft::geometry {
 
-struct SpaceCurve {  // a cubic B-spline curve in space, mm
-  std::vector<double> knots;
-  std::vector<Eigen::Vector3d> control;
-  Eigen::Vector3d at(double t) const;
-};
-
 struct TrimCurve {
   PlanCurve path;                        // (u, v)
   std::optional<SpaceCurve> image = {};  // surface(path), where it is known

@@ -12,9 +12,13 @@ namespace moldloft::bench {
 
 // Each in a file of its own, bench/NAME.cpp.
 Json run_edges(const Options&);
+Json run_fit(const Options&);
+Json run_thesis(const Options&);
 
 std::span<const Benchmark> all_benchmarks() {
   static const std::vector<Benchmark> all{
+      {"fit", "surface fit: floors, nets, choice of the net, bad data, growth", run_fit},
+      {"thesis", "chapter 6 of the thesis again: wave, hood, fuselage, plate, tables 6.1 to 6.3", run_thesis},
       {"edges", "the plate's edge in one shot", run_edges},
   };
   return all;
