@@ -64,15 +64,13 @@ int free_column(const Eigen::MatrixXd& triangle) {
 
 }  // namespace
 
-Eigen::MatrixXd matching_matrix(int degree_u, int degree_v, std::span<const BezierStripe> stripes) {
+void matching_matrix(int degree_u, int degree_v, std::span<const BezierStripe> stripes,
+                     Eigen::MatrixXd& matrix) {
   const Eigen::Index rows = degree_u + degree_v + 1;
-  Eigen::MatrixXd matrix(rows * static_cast<Eigen::Index>(stripes.size()), (degree_u + 1) * (degree_v + 1));
-  Eigen::MatrixXd block(rows, matrix.cols());
-  for (std::size_t s = 0; s < stripes.size(); ++s) {
-    fill_matching_rows(degree_u, degree_v, stripes[s].from, stripes[s].to, block);
-    matrix.middleRows(static_cast<Eigen::Index>(s) * rows, rows) = block;
-  }
-  return matrix;
+  matrix.resize(rows * static_cast<Eigen::Index>(stripes.size()), (degree_u + 1) * (degree_v + 1));
+  for (std::size_t s = 0; s < stripes.size(); ++s)
+    fill_matching_rows(degree_u, degree_v, stripes[s].from, stripes[s].to,
+                       matrix.middleRows(static_cast<Eigen::Index>(s) * rows, rows));
 }
 
 std::expected<BezierSurfaceFit, MatchingFailure> fit_bezier_surface(std::span<const BezierStripe> stripes,
@@ -96,7 +94,8 @@ std::expected<BezierSurfaceFit, MatchingFailure> fit_bezier_surface(std::span<co
   fit.equations = static_cast<int>(stripes.size()) * (raised + 1);
   if (fit.equations < fit.unknowns) return std::unexpected(MatchingFailure{.what = Error::too_few_stripes});
 
-  const Eigen::MatrixXd matrix = matching_matrix(settings.degree_u, settings.degree_v, stripes);
+  Eigen::MatrixXd matrix;
+  matching_matrix(settings.degree_u, settings.degree_v, stripes, matrix);
   Eigen::MatrixX3d data(matrix.rows(), 3);
   for (std::size_t s = 0; s < stripes.size(); ++s)
     data.middleRows(static_cast<Eigen::Index>(s) * (raised + 1), raised + 1) =

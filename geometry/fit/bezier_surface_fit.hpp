@@ -46,8 +46,8 @@ struct BezierSurfaceFit {
   double rms_mm = 0, max_mm = 0;  // of the equations
 };
 
-// [a] of equation (3.14): degree_u + degree_v + 1 rows a stripe.
-Eigen::MatrixXd matching_matrix(int degree_u, int degree_v, std::span<const BezierStripe>);
+// Fills [a] of equation (3.14): degree_u + degree_v + 1 rows a stripe. Allocates only when `matrix` has another size.
+void matching_matrix(int degree_u, int degree_v, std::span<const BezierStripe>, Eigen::MatrixXd& matrix);
 
 std::expected<BezierSurfaceFit, MatchingFailure> fit_bezier_surface(std::span<const BezierStripe>,
                                                                     const BezierFitSettings&);

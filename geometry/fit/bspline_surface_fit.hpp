@@ -68,8 +68,8 @@ class BSplineSurfaceFit {
                                                        std::span<const SampledPoints> samples,
                                                        const BSplineSurface& base) const;
 
-  MatchingResidual residual(std::span<const SpaceCurve> stripes,
-                            std::span<const SampledPoints> samples, const BSplineSurface&) const;
+  MatchingResidual residual(std::span<const SpaceCurve> stripes, std::span<const SampledPoints> samples,
+                            const BSplineSurface&) const;
 
   // Of the normal equations, estimated (matching_system.hpp).
   double condition() const { return system_.condition(); }

@@ -15,7 +15,8 @@ std::vector<double> consistent_parameters(std::span<const Eigen::Vector2d> uv, c
 
 std::expected<StripeCurve, CurveFitError> fit_stripe(std::span<const Eigen::Vector3d> points,
                                                      std::span<const Eigen::Vector2d> uv,
-                                                     std::span<const double> knots, StripeParameter parameter) {
+                                                     std::span<const double> knots,
+                                                     StripeParameter parameter) {
   assert(uv.size() == points.size());
   if (points.size() < 2) return std::unexpected(CurveFitError{Error::too_few_points});
   const Eigen::Vector2d from = uv.front(), to = uv.back();

@@ -69,7 +69,7 @@ std::expected<void, Error> check_image(const BSplineSurface& surface, const Trim
   for (int i = 0; i <= looks; ++i) {
     const double t = a + (b - a) * i / looks;
     const Vector2d uv = curve.path.at(t).value;
-    if (!((surface.at(uv.x(), uv.y()).value - curve.image->at(t)).norm() <= tolerance_mm))
+    if (!((surface.at(uv.x(), uv.y()).value - curve.image->value(t)).norm() <= tolerance_mm))
       return std::unexpected(Error::off_surface);
   }
   return {};
@@ -156,15 +156,6 @@ bool piece_fits(const BSplineSurface& surface, const PlanCurve& path, double a, 
 }
 
 }  // namespace
-
-Vector3d SpaceCurve::at(double t) const {
-  t = std::clamp(t, domain_start(*this), domain_end(*this));
-  const int k = find_span(knots, t);
-  const BasisValues basis = cubic_basis(knots, k, t);
-  Vector3d point = Vector3d::Zero();
-  for (int i = 0; i <= cubic; ++i) point += basis.value[i] * control[k - cubic + i];
-  return point;
-}
 
 TrimLoop natural_border(const BSplineSurface& s) {
   return {border(s, true, false, false), border(s, false, true, false), border(s, true, true, true),

@@ -24,7 +24,8 @@ struct Stripes {
   std::vector<SpaceCurve> curves;
 };
 
-void add(Stripes& stripes, const std::vector<double>& knots, const Preimage& preimage, const MatrixX3d& control) {
+void add(Stripes& stripes, const std::vector<double>& knots, const Preimage& preimage,
+         const MatrixX3d& control) {
   stripes.tracks.push_back({knots, preimage});
   SpaceCurve& curve = stripes.curves.emplace_back();
   curve.knots = knots;
@@ -76,7 +77,8 @@ Stripes random_stripes(int count, int seed) {
     const std::vector<double> knots = uniform_clamped_knots(1 + s % 4);
     const bool along_v = s % 2 == 0;
     const double from = unit(random), to = unit(random);
-    add(stripes, knots, along_v ? straight_preimage({from, 0}, {to, 1}) : straight_preimage({1, from}, {0, to}),
+    add(stripes, knots,
+        along_v ? straight_preimage({from, 0}, {to, 1}) : straight_preimage({1, from}, {0, to}),
         MatrixX3d::NullaryExpr(static_cast<int>(knots.size()) - 4, 3, [&] { return unit(random); }));
   }
   return stripes;

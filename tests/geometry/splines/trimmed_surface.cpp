@@ -40,7 +40,7 @@ TEST_CASE("the natural border runs counter-clockwise, and its images are the sur
         const Vector2d uv = curve.path.at(t).value;
         CHECK(uv[i % 2] == doctest::Approx(t).epsilon(1e-14));  // unit speed
         // Two evaluations, each within 16 eps of the net's size; the path's rounding adds as much.
-        CHECK((curve.image->at(t) - s.at(uv.x(), uv.y()).value).norm() <= 64 * 2.3e-16 * size);
+        CHECK((curve.image->value(t) - s.at(uv.x(), uv.y()).value).norm() <= 64 * 2.3e-16 * size);
       }
     }
     CHECK(check({.surface = s, .outer = border}, tolerance_mm).has_value());
@@ -61,12 +61,12 @@ TEST_CASE("the image of a path stays within the tolerance asked for, and meets i
         for (int k = 0; k <= 5000; ++k) {
           const double t = a + (b - a) * k / 5000;
           const Vector2d uv = curve.path.at(t).value;
-          worst = std::max(worst, (image.at(t) - face.surface.at(uv.x(), uv.y()).value).norm());
+          worst = std::max(worst, (image.value(t) - face.surface.at(uv.x(), uv.y()).value).norm());
         }
         CHECK(worst <= tolerance);
         for (const double t : {a, b}) {
           const Vector2d uv = curve.path.at(t).value;
-          CHECK((image.at(t) - face.surface.at(uv.x(), uv.y()).value).norm() < 1e-12);
+          CHECK((image.value(t) - face.surface.at(uv.x(), uv.y()).value).norm() < 1e-12);
         }
       }
     }
@@ -85,7 +85,7 @@ TEST_CASE("on a plane the image of a path is the path itself, and takes no more 
   for (int k = 0; k <= 100; ++k) {
     const Vector2d uv = path.at(k / 100.0).value;
     const Vector3d truth(200 * uv.x(), 100 * uv.y(), 3 + 100 * uv.x() - 25 * uv.y());
-    CHECK((image.at(k / 100.0) - truth).norm() < 1e-11);
+    CHECK((image.value(k / 100.0) - truth).norm() < 1e-11);
   }
 }
 
