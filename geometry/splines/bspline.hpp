@@ -5,8 +5,8 @@
 // Accuracy     values within 8 p eps of the largest control coordinate of the curve, 8 (p + q) eps for a
 //              surface of degrees p, q. First derivatives likewise of the largest control point of the
 //              derivative.
-// Cost         bicubic value and all first and second derivatives about 45 ns, no search where knots are
-//              uniform; any other degree about 4 times that
+// Cost         bicubic value and all first and second derivatives 50 ns on a server core of 2023, some 30
+//              more where uneven knots must be searched; bi-quartic 230 ns
 // Allocation   none in at(), value() and de_boor()
 // Expects      knots that pass check_knots() with as many control points as there are; degrees <=
 //              most_spline_degree
