@@ -30,7 +30,8 @@ class BandCholesky {
   double smallest_pivot() const { return smallest_; }
   double largest_pivot() const { return largest_; }
 
-  // One slice of L y = b, columns [first, end) in ascending order, and of L' x = y, in descending order; in place.
+  // One slice of L y = b, columns [first, end) in ascending order, and of L' x = y, in descending order; in
+  // place.
   void solve_lower(std::span<double> x, int first, int end) const;
   void solve_upper(std::span<double> x, int first, int end) const;
 

@@ -26,8 +26,9 @@ inline BernsteinValues bernstein(double t) {
            t3 * t3}};
 }
 
-// From the Bernstein polynomials of degree k, blossomed at k arguments, to those of degree k + 1 with one more
-// argument t (thesis eq. 2.31 with an argument of its own for every step). In place; `row` has room for k + 2.
+// From the Bernstein polynomials of degree k, blossomed at k arguments, to those of degree k + 1 with one
+// more argument t (thesis eq. 2.31 with an argument of its own for every step). In place; `row` has room for
+// k + 2.
 inline void raise_bernstein(double* row, int k, double t) {
   row[k + 1] = 0;
   for (int p = k + 1; p > 0; --p) row[p] = (1 - t) * row[p] + t * row[p - 1];
@@ -35,7 +36,8 @@ inline void raise_bernstein(double* row, int k, double t) {
 }
 
 // R with B_p^n(a + (b - a) t) = sum_l R[p][l] B_l^n(t) (thesis eq. 3.6): the blossom of B_p^n at n - l times
-// a and l times b. restrict_bernstein() of bernstein_form.hpp is the same for a degree known only at run time.
+// a and l times b. restrict_bernstein() of bernstein_form.hpp is the same for a degree known only at run
+// time.
 template <int degree>
 std::array<std::array<double, degree + 1>, degree + 1> restriction(double a, double b) {
   std::array<std::array<double, degree + 1>, degree + 1> r{};

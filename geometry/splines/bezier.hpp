@@ -1,8 +1,9 @@
-// Bezier curves and surfaces of any degree, and the Bezier pieces of B-splines (thesis sections 2.3, 2.4, 3.2).
+// Bezier curves and surfaces of any degree, and the Bezier pieces of B-splines (thesis sections 2.3, 2.4,
+// 3.2).
 //
 // Units        those of the control points; parameters in [0, 1]
-// Accuracy     values, pieces, raised degrees and restrictions within 4 n eps of the largest control coordinate, n the
-//              degree (for a surface: the sum of both)
+// Accuracy     values, pieces, raised degrees and restrictions within 4 n eps of the largest control
+//              coordinate, n the degree (for a surface: the sum of both)
 // Cost         a curve point n^2, a surface point 9 (n + 1) (m + 1) + n^2 + m^2
 // Allocation   none in at(); elsewhere what is returned
 // Failure      none; degrees to most_bernstein_degree (asserted)
@@ -45,8 +46,8 @@ BezierCurve<dim> restrict_to(const BezierCurve<dim>& curve, double a, double b);
 
 BezierSurface elevate(const BezierSurface& surface, int degree_u, int degree_v);
 
-// The surface on a box of its domain, over [0, 1]^2 again; a side of the box may run backwards. Subdivision is this
-// with boxes that share a side.
+// The surface on a box of its domain, over [0, 1]^2 again; a side of the box may run backwards. Subdivision
+// is this with boxes that share a side.
 struct Box {
   double begin_u, end_u, begin_v, end_v;
 };

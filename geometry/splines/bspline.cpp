@@ -13,7 +13,8 @@ namespace {
 
 using BasisToSecond = std::array<double, 3 * (most_spline_degree + 1)>;
 
-// Two doubles side by side: what every 64-bit machine has registers for, so that one order of summation serves all.
+// Two doubles side by side: what every 64-bit machine has registers for, so that one order of summation
+// serves all.
 using Pair [[gnu::vector_size(16)]] = double;
 
 Pair first_of(Pair a, Pair b) { return __builtin_shufflevector(a, b, 0, 2); }
@@ -39,7 +40,8 @@ Pair dots(const Four& a, const Four& wa, const Four& b, const Four& wb) {
   return first_of(pa, pb) + second_of(pa, pb);
 }
 
-// The rows of a bicubic patch summed along v: with the values of the basis there, its first, its second derivatives.
+// The rows of a bicubic patch summed along v: with the values of the basis there, its first, its second
+// derivatives.
 struct SummedAlongV {
   Four value, first, second;
 };

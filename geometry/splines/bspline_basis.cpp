@@ -9,8 +9,8 @@ namespace {
 
 using Row = std::array<double, most_spline_degree + 1>;
 
-// From the q functions of degree q - 1 on span k to the q + 1 functions of degree q (eq. 2.45). Shared with the blossom:
-// with another argument at every step this gives the basis's polar values.
+// From the q functions of degree q - 1 on span k to the q + 1 functions of degree q (eq. 2.45). Shared with
+// the blossom: with another argument at every step this gives the basis's polar values.
 void raise_value(std::span<const double> knots, int k, int q, double t, Row& row) {
   row[q] = 0;
   for (int j = q - 1; j >= 0; --j) {  // function j stands on knots[low] .. knots[low + q]

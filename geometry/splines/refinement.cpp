@@ -41,7 +41,8 @@ BSplineSurface transposed(const BSplineSurface& s) {
   return {s.knots_v, s.knots_u, s.x.transpose(), s.y.transpose(), s.z.transpose(), s.degree_v, s.degree_u};
 }
 
-// Where a curve over these knots is cut at t: the knots of both halves, and the control point that they share.
+// Where a curve over these knots is cut at t: the knots of both halves, and the control point that they
+// share.
 struct Cut {
   std::vector<double> left, right;
   int shared;
@@ -92,9 +93,9 @@ Eigen::MatrixXd refinement_matrix(std::span<const double> knots, int degree, std
 
 SplineCoefficients elevate_coefficients(std::span<const double> knots, int degree,
                                         const Eigen::MatrixXd& rows) {
-  // Control point i of the raised spline is the blossom of degree + 1 at raised knots i + 1 ... i + degree + 1, and that
-  // is the mean of the old blossom over all ways to leave one of these out. Leaving out the knot t gives control
-  // points of the old spline refined to all raised knots but t.
+  // Control point i of the raised spline is the blossom of degree + 1 at raised knots i + 1 ... i + degree +
+  // 1, and that is the mean of the old blossom over all ways to leave one of these out. Leaving out the knot
+  // t gives control points of the old spline refined to all raised knots but t.
   std::vector<double> distinct{knots.begin(), knots.end()};
   distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
   std::vector<double> interior{knots.begin() + degree + 1, knots.end() - degree - 1};

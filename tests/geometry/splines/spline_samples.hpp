@@ -1,4 +1,5 @@
-// Seeded curves, surfaces and knots for the spline tests, and the basis from its definition in extended precision.
+// Seeded curves, surfaces and knots for the spline tests, and the basis from its definition in extended
+// precision.
 #pragma once
 
 #include <algorithm>
@@ -29,8 +30,8 @@ inline long double basis(const std::vector<double>& knots, int i, int p, long do
   return sum;
 }
 
-// Its m-th derivative by differences of lower degrees, straight from (2.45). `sign` = 1 gives what the differences are
-// made of instead: the sum of their absolute values.
+// Its m-th derivative by differences of lower degrees, straight from (2.45). `sign` = 1 gives what the
+// differences are made of instead: the sum of their absolute values.
 inline long double basis_derivative(const std::vector<double>& knots, int i, int p, int m, long double t,
                                     int sign = -1) {
   if (m == 0) return basis(knots, i, p, t);
@@ -48,7 +49,8 @@ struct Numbers {
   double in(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
   int of(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); }
 
-  // Clamped knots on [0, 1] with `interior` uneven interior knots, some of them double where the degree allows it.
+  // Clamped knots on [0, 1] with `interior` uneven interior knots, some of them double where the degree
+  // allows it.
   std::vector<double> knots(int degree, int interior) {
     std::vector<double> inner(static_cast<std::size_t>(interior));
     for (double& t : inner) t = in(0.02, 0.98);
