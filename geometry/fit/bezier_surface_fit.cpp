@@ -37,8 +37,8 @@ std::expected<void, MatchingFailure> check(std::span<const BezierStripe> stripes
   return {};
 }
 
-// Largest and smallest singular value of an upper triangular matrix by some steps of (inverse) power iteration from
-// a fixed start: the quotient is never above the condition, and soon close to it.
+// Largest and smallest singular value of an upper triangular matrix by some steps of (inverse) power
+// iteration from a fixed start: the quotient is never above the condition, and soon close to it.
 double condition_of(const Eigen::MatrixXd& triangle) {
   const auto r = triangle.triangularView<Eigen::Upper>();
   constexpr int steps = 12;

@@ -1,13 +1,16 @@
-// A bicubic B-spline surface through stripes whose places on it are known: each stripe is a cubic B-spline curve cut
-// into Bezier pieces at its own knots and at the surface's, and each piece gives seven equations on the 16 control
-// points of its cell (thesis section 3.3, eq. 3.15-3.42). The matrix depends on the pre-images alone, so that the
-// same places measured again are solved on the stored factor. Points with (u, v) of their own may be mixed in.
+// A bicubic B-spline surface through stripes whose places on it are known: each stripe is a cubic B-spline
+// curve cut into Bezier pieces at its own knots and at the surface's, and each piece gives seven equations on
+// the 16 control points of its cell (thesis section 3.3, eq. 3.15-3.42). The matrix depends on the pre-images
+// alone, so that the same places measured again are solved on the stored factor. Points with (u, v) of their
+// own may be mixed in.
 //
 // Shapes       surface control net: knots_u.size() - 4 by knots_v.size() - 4
 // Units        control points in mm in, mm out; (u, v), t and weights are plain numbers
-// Accuracy     the control points are the least squares solution within 4 half_band eps condition() of their size
-//              (Higham, Accuracy and Stability, theorem 10.4): a surface of these knots comes back from its own stripes
-// Cost         0.4 us a piece to assemble, 0.2 us to solve for, and the band factorization (matching_system.hpp)
+// Accuracy     the control points are the least squares solution within 4 half_band eps condition() of their
+//              size (Higham, Accuracy and Stability, theorem 10.4): a surface of these knots comes back from
+//              its own stripes
+// Cost         0.4 us a piece to assemble, 0.2 us to solve for, and the band factorization
+//              (matching_system.hpp)
 // Allocation   0.3 kB a piece and the band; solve() a right side and the surface
 // Failure      MatchingFailure, which names the stripe or the control point
 #pragma once
@@ -34,8 +37,8 @@ struct SampledTrack {  // points with their own (u, v), one equation each
   std::vector<double> weight;  // of the squared residual; none: 1 each
 };
 
-// A piece counts once as it is (the thesis), or by its length in (u, v): a sliver that a knot line cuts off would
-// else weigh like a whole span.
+// A piece counts once as it is (the thesis), or by its length in (u, v): a sliver that a knot line cuts off
+// would else weigh like a whole span.
 enum class PieceWeight { one, length };
 
 struct MatchingSettings {
@@ -62,8 +65,9 @@ class BSplineSurfaceFit {
       std::vector<double> knots_u, std::vector<double> knots_v, std::span<const StripeTrack> stripes,
       std::span<const SampledTrack> samples = {}, const MatchingSettings& = {});
 
-  // The curve of every stripe and the points of every sampled track, in the order of assemble(). The outer ring of
-  // `base` (the Coons net of the boundary curves) is kept when the ring is given; else base is not looked at.
+  // The curve of every stripe and the points of every sampled track, in the order of assemble(). The outer
+  // ring of `base` (the Coons net of the boundary curves) is kept when the ring is given; else base is not
+  // looked at.
   std::expected<BSplineSurface, MatchingFailure> solve(std::span<const SpaceCurve> stripes,
                                                        std::span<const SampledPoints> samples,
                                                        const BSplineSurface& base) const;

@@ -1,5 +1,5 @@
-// The normal equations of bicubic B-spline control points under rows that each live on one cell of the net: band
-// Cholesky (thesis eq. 3.42) with the factor kept, the outer ring unknown or given (eq. 3.40, 3.41).
+// The normal equations of bicubic B-spline control points under rows that each live on one cell of the net:
+// band Cholesky (thesis eq. 3.42) with the factor kept, the outer ring unknown or given (eq. 3.40, 3.41).
 //
 // Shapes       a row is 16 numbers, basis function (i, j) of the cell's 4 x 4 at 4 i + j
 // Cost         136 multiply-adds a row; size * half_band^2 to factor; 4 * size * half_band an axis to solve
@@ -29,7 +29,8 @@ class MatchingSystem {
 
   MatchingSystem(int control_u, int control_v, Ring);
 
-  // Adds the Gram matrix of a cell's rows; (first_u, first_v) is the first of the cell's 4 x 4 control points.
+  // Adds the Gram matrix of a cell's rows; (first_u, first_v) is the first of the cell's 4 x 4 control
+  // points.
   using Gram = Eigen::Matrix<double, 16, 16>;  // the blocks on and below the diagonal count, whole
   void add(int first_u, int first_v, const Gram&);
 
@@ -40,8 +41,9 @@ class MatchingSystem {
   void add_side(int first_u, int first_v, const Side&, Eigen::MatrixX3d& side) const;
   void solve(Eigen::MatrixX3d& side) const;  // in place; factor() has succeeded
 
-  // Of the factored matrix in the 2-norm: the square of the equations'. Its largest eigenvalue by the largest row sum,
-  // its smallest by inverse iteration: between a half and eight times the truth. Costs some ten solutions.
+  // Of the factored matrix in the 2-norm: the square of the equations'. Its largest eigenvalue by the largest
+  // row sum, its smallest by inverse iteration: between a half and eight times the truth. Costs some ten
+  // solutions.
   double condition() const;
   int half_band() const { return band_.half_band(); }
 

@@ -18,8 +18,8 @@
 
 namespace moldloft::geometry {
 
-// A path in (u, v) that is straight between its vertices, each reached at its own t. Two vertices are the thesis's
-// straight line (eq. 3.4), more of them a stripe that is not straight there.
+// A path in (u, v) that is straight between its vertices, each reached at its own t. Two vertices are the
+// thesis's straight line (eq. 3.4), more of them a stripe that is not straight there.
 struct Preimage {
   std::vector<double> t;  // increasing; from the stripe's first knot to its last
   std::vector<Eigen::Vector2d> uv;
@@ -38,7 +38,8 @@ struct StripePiece {
 // Whether `knots` can carry cubic splines: finite, nondecreasing, and every basis function has a support.
 std::expected<void, Error> check_knots(std::span<const double> knots);
 
-// Whether the pre-image has length everywhere and stays in [knots_u domain] x [knots_v domain]; the knots are valid.
+// Whether the pre-image has length everywhere and stays in [knots_u domain] x [knots_v domain]; the knots are
+// valid.
 std::expected<void, Error> check_preimage(const Preimage&, std::span<const double> stripe_knots,
                                           std::span<const double> knots_u, std::span<const double> knots_v);
 

@@ -5,20 +5,20 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <string>
+
+#include "geometry/splines/coons_patch.hpp"
+#include "geometry/splines/derived_curves.hpp"
 
 namespace moldloft::bench {
 
 using namespace geometry;
 using Eigen::Vector2d, Eigen::Vector3d;
 
-namespace {
-
-[[noreturn]] void give_up(const std::string& words) {
+void give_up(const std::string& words) {
   fmt::print(stderr, "moldloft-bench thesis: {}\n", words);
   std::exit(1);
 }
-
-}  // namespace
 
 Line within_square(const Vector2d& through, const Vector2d& direction) {
   double first = -1e9, last = 1e9;
@@ -113,21 +113,10 @@ BSplineSurface graph_surface(const std::vector<double>& knots_u, const std::vect
 }
 
 BSplineSurface coons_base(const BSplineSurface& surface) {
-  BSplineSurface base = surface;
-  for (Eigen::MatrixXd* net : {&base.x, &base.y, &base.z}) {
-    const Eigen::Index m = net->rows() - 1, n = net->cols() - 1;
-    const Eigen::MatrixXd ring = *net;
-    for (Eigen::Index i = 1; i < m; ++i) {
-      const double u = greville(surface.knots_u, static_cast<int>(i));
-      for (Eigen::Index j = 1; j < n; ++j) {
-        const double v = greville(surface.knots_v, static_cast<int>(j));
-        (*net)(i, j) =
-            (1 - v) * ring(i, 0) + v * ring(i, n) + (1 - u) * ring(0, j) + u * ring(m, j) -
-            ((1 - u) * ((1 - v) * ring(0, 0) + v * ring(0, n)) + u * ((1 - v) * ring(m, 0) + v * ring(m, n)));
-      }
-    }
-  }
-  return base;
+  const auto patch = CoonsPatch::through({line_along_u(surface, 0), line_along_u(surface, 1),
+                                          line_along_v(surface, 0), line_along_v(surface, 1)});
+  if (!patch) give_up(std::string{to_string(patch.error().what)});
+  return patch->net();
 }
 
 namespace {

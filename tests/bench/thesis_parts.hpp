@@ -1,10 +1,11 @@
-// What the examples of chapter 6 share: a known surface, stripes sampled from it along given lines, and how far a
-// reconstruction is from the truth.
+// What the examples of chapter 6 share: a known surface, stripes sampled from it along given lines, and how
+// far a reconstruction is from the truth.
 #pragma once
 
 #include <Eigen/Core>
 #include <functional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "bench/benchmark.hpp"
@@ -17,6 +18,9 @@ namespace moldloft::bench {
 struct Line {  // in the unit square
   Eigen::Vector2d from, to;
 };
+
+// Ends the program with words on stderr: an example that cannot be computed is a fault of the benchmark.
+[[noreturn]] void give_up(const std::string& words);
 
 // The part of the line through `through` in `direction` that lies in the unit square.
 Line within_square(const Eigen::Vector2d& through, const Eigen::Vector2d& direction);
@@ -35,8 +39,8 @@ struct Spread {
 Spread spread_of(std::span<const double>);
 Json to_json(const Spread&);
 
-// On 50 x 50 points of the unit square: the height's difference at equal parameters, as the thesis measures, and the
-// distance from the reconstruction's points to the truth.
+// On 50 x 50 points of the unit square: the height's difference at equal parameters, as the thesis measures,
+// and the distance from the reconstruction's points to the truth.
 struct Comparison {
   Spread height, distance;
 };
@@ -49,7 +53,7 @@ double foot_distance(const geometry::BSplineSurface&, const Eigen::Vector3d&, Ei
 geometry::BSplineSurface graph_surface(const std::vector<double>& knots_u, const std::vector<double>& knots_v,
                                        double size, const std::function<double(int, int)>& height);
 
-// Only the outer ring of `surface`, blended inside as a bilinear Coons patch: the base of a fit, and its ring.
+// The bilinear Coons patch of the surface's boundary: the base of a fit, and its ring.
 geometry::BSplineSurface coons_base(const geometry::BSplineSurface& surface);
 
 struct StripeFit {

@@ -1,14 +1,16 @@
-// Section 6.4, the plate: nine shots, 54 stripes as cubic Bezier curves, boundary curves of 8 control points, 25
-// patches, and 1,169 points of a coordinate measuring machine to compare with.
+// Section 6.4, the plate: nine shots, 54 stripes as cubic Bezier curves, boundary curves of 8 control points,
+// 25 patches, and 1,169 points of a coordinate measuring machine to compare with.
 #include <fmt/core.h>
 
 #include <array>
 #include <cmath>
 #include <random>
+#include <string>
 
 #include "bench/thesis.hpp"
 #include "bench/thesis_simulated_plate.hpp"
 #include "geometry/fit/plan_map.hpp"
+#include "geometry/splines/coons_patch.hpp"
 
 namespace moldloft::bench {
 
@@ -22,33 +24,32 @@ constexpr int stripe_count = 54, stripe_points = 500;
 constexpr double edge_noise_mm = 0.2;  // of an edge point along its stripe: the spacing of points on it
 constexpr double published_max_mm = 1.49;
 
-// The four boundary curves from noisy edge points, as the ring of a net over the unit square.
-BSplineSurface measured_boundary(std::mt19937& random) {
+// The Coons patch of four boundary curves through noisy edge points. Ends are the points seen there: at a
+// corner two of them, between which the patch settles.
+BSplineSurface measured_base(std::mt19937& random) {
   std::normal_distribution<double> normal(0, 1);
   const auto knots = uniform_clamped_knots(spans);
-  BSplineSurface ring = graph_surface(knots, knots, plate_size_mm, [](int, int) { return 0.0; });
-  const std::array<Line, 4> sides{Line{{0, 0}, {1, 0}}, Line{{1, 0}, {1, 1}}, Line{{0, 1}, {1, 1}},
-                                  Line{{0, 0}, {0, 1}}};
+  const std::array<Line, 4> sides{Line{{0, 0}, {1, 0}}, Line{{0, 1}, {1, 1}}, Line{{0, 0}, {0, 1}},
+                                  Line{{1, 0}, {1, 1}}};
+  std::array<SpaceCurve, 4> curves;
+  constexpr int count = 300;
   for (int side = 0; side < 4; ++side) {
     std::vector<Vector3d> points;
-    for (int i = 0; i < 300; ++i) {
-      const Vector2d at = sides[side].from + i / 299.0 * (sides[side].to - sides[side].from);
-      Vector2d xy = plate_size_mm * at;
+    for (int i = 0; i < count; ++i) {
+      const double t = i / (count - 1.0);
+      Vector2d xy = plate_size_mm * ((1 - t) * sides[side].from + t * sides[side].to);
       const double z = plate_height(xy.x(), xy.y()) + height_noise_mm * normal(random);
-      if (i > 0 && i < 299) xy[side % 2 == 0 ? 1 : 0] += edge_noise_mm * normal(random);
+      const bool corner = i == 0 || i == count - 1;
+      if (!corner) xy[side < 2 ? 1 : 0] += edge_noise_mm * normal(random);
       points.emplace_back(xy.x(), xy.y(), z);
     }
-    // Ends as they are, so that neighbouring curves meet up to the corners' own noise, which the last one settles.
     const auto curve = fit_curve<3>(points, knots, {.interpolate_ends = true});
-    if (!curve) continue;
-    for (int n = 0; n < spans + 3; ++n) {
-      const int i = side == 0 || side == 2 ? n : side == 1 ? spans + 2 : 0;
-      const int j = side == 0 ? 0 : side == 2 ? spans + 2 : n;
-      const Vector3d& p = curve->curve.control[n];
-      ring.x(i, j) = p.x(), ring.y(i, j) = p.y(), ring.z(i, j) = p.z();
-    }
+    if (!curve) give_up(std::string{to_string(curve.error().what)});
+    curves[side] = curve->curve;
   }
-  return coons_base(ring);
+  const auto patch = CoonsPatch::through({curves[0], curves[1], curves[2], curves[3]}, 10 * height_noise_mm);
+  if (!patch) give_up(std::string{to_string(patch.error().what)});
+  return patch->net();
 }
 
 // (u, v) of what the robot believes, by inverting the boundary's planar Coons map.
@@ -92,7 +93,7 @@ Spread distances_of_cmm_points(const BSplineSurface& surface) {
 
 Json thesis_plate(const Options& options) {
   std::mt19937 random(64);
-  const BSplineSurface base = measured_boundary(random);
+  const BSplineSurface base = measured_base(random);
   auto stripes = plate_stripes(stripe_count, stripe_points, {height_noise_mm, robot_error_mm}, 54);
   if (!place_in_plan(stripes, base)) return nullptr;
 

@@ -1,5 +1,6 @@
-// Sections 6.3 and 6.4: the car hood and the fuselage. The thesis prints how many curves, pieces and knots there are,
-// not the control nets; these are stand-ins of the same structure, so that the errors can be known at all.
+// Sections 6.3 and 6.4: the car hood and the fuselage. The thesis prints how many curves, pieces and knots
+// there are, not the control nets; these are stand-ins of the same structure, so that the errors can be known
+// at all.
 #include <fmt/core.h>
 
 #include <cmath>

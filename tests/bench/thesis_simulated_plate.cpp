@@ -22,8 +22,6 @@ double plate_height(double x, double y) {
 
 std::vector<SampledStripe> plate_stripes(int count, int points_a_stripe, const Noise& noise, unsigned seed) {
   constexpr int shots = 9;
-  constexpr double slope =
-      12 * std::numbers::pi / 180;               // of the stripes to the plate's side: acute to every border
   constexpr double inset = 0.2 / plate_size_mm;  // the last point of a stripe lies inside the border
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0, 1);

@@ -120,8 +120,7 @@ Json table_6_1(std::span<const BezierStripe> stripes, const Options& options) {
     const auto definition = literal_matrix<ByDefinition>(degree, stripes, formed);
     std::optional<double> recurrence_s;
     MatrixXd ours;
-    const double matrix_s =
-        time_of(n < 20 ? 5 : 3, [&] { ours = matching_matrix(degree, degree, stripes); }).least;
+    const double matrix_s = time_of(7, [&] { matching_matrix(degree, degree, stripes, ours); }).least;
     double largest = (ours.topRows(definition.rows.rows()) - definition.rows).cwiseAbs().maxCoeff();
     if (!options.quick || n < 25) {
       const auto recurrence = literal_matrix<ByRecurrence>(degree, stripes, formed);

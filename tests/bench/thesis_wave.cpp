@@ -84,8 +84,8 @@ std::vector<Layout> layouts() {
   return all;
 }
 
-// (u, v) of the points by inverting the boundary's planar Coons map at their (x, y), which need not be known otherwise.
-// The map's accuracy is stated in mm: the unit square is taken as a metre.
+// (u, v) of the points by inverting the boundary's planar Coons map at their (x, y), which need not be known
+// otherwise. The map's accuracy is stated in mm: the unit square is taken as a metre.
 constexpr double unit_mm = 1000;
 std::vector<SampledStripe> in_plan_view(std::span<const SampledStripe> stripes, const PlanMap& map) {
   std::vector<SampledStripe> all(stripes.begin(), stripes.end());

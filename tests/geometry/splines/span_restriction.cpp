@@ -10,8 +10,8 @@
 using namespace moldloft::geometry;
 
 TEST_CASE("the middle patch of six by six control points has the thesis's printed coefficients") {
-  // Thesis page 45: P33 = 1/16 q11 + 7/48 q12 + 1/24 q13 + 7/48 q21 + 49/144 q22 + 7/72 q23 + ..., the products of
-  // (1/4, 7/12, 1/6); P34 and P35 have (2/3, 1/3) and (1/3, 2/3) along v; P36 mirrors P33.
+  // Thesis page 45: P33 = 1/16 q11 + 7/48 q12 + 1/24 q13 + 7/48 q21 + 49/144 q22 + 7/72 q23 + ..., the
+  // products of (1/4, 7/12, 1/6); P34 and P35 have (2/3, 1/3) and (1/3, 2/3) along v; P36 mirrors P33.
   const std::vector<double> knots{0, 0, 0, 0, 1.0 / 3, 2.0 / 3, 1, 1, 1, 1};
   const Eigen::Matrix4d r = span_restriction(knots, 4, knots[4], knots[5]);
   Eigen::Matrix4d printed;  // row: q1..q4, column: the patch's control point
