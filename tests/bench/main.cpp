@@ -11,8 +11,14 @@
 namespace moldloft::bench {
 
 // Each in a file of its own, bench/NAME.cpp.
+Json run_project(const Options&);
+Json run_localize(const Options&);
+
 std::span<const Benchmark> all_benchmarks() {
-  static const std::vector<Benchmark> all{};
+  static const std::vector<Benchmark> all{
+      {"project", "foot points with a guess and from nowhere", run_project},
+      {"localize", "poses of measured points, and their deviations", run_localize},
+  };
   return all;
 }
 
