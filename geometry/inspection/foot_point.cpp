@@ -82,8 +82,8 @@ inline void least_of_model(double huu, double huv, double hvv, double gu, double
   }
 }
 
-// Where the Hessian is not positive, beyond a centre of curvature, its negative direction is turned round by a multiple
-// of the metric: steps stay as long as Newton's, and lead down from a saddle.
+// Where the Hessian is not positive, beyond a centre of curvature, its negative direction is turned round by
+// a multiple of the metric: steps stay as long as Newton's, and lead down from a saddle.
 inline void step_downhill(const Slope& s, double u, double v, const Rectangle& r, double& du, double& dv) {
   if (!(s.a > 0) || !(s.c > 0)) return;  // a pole, where a direction of the surface vanishes
   const double huu = s.huu / s.a, hvv = s.hvv / s.c, huv = s.huv / std::sqrt(s.a * s.c);
@@ -323,8 +323,8 @@ class Search {
     if (!place.converged) least_ = std::min(least_, lowest);
   }
 
-  // No point of the net's hull is nearer than its least share along the direction to its middle. Of a piece that faces
-  // the point this misses the second order of the piece's size, a box the first.
+  // No point of the net's hull is nearer than its least share along the direction to its middle. Of a piece
+  // that faces the point this misses the second order of the piece's size, a box the first.
   double lower_square(const BezierNet& net) const {
     const double by_box = box_of(net).squared_distance(p_);
     const Vector3d towards = 0.25 * (net[1][1] + net[1][2] + net[2][1] + net[2][2]) - p_;

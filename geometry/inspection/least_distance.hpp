@@ -5,7 +5,7 @@
 //              (same chapter, NNLS)
 // Shapes       `rows` holds m rows of 6 numbers (zeros for fewer unknowns), `bounds` holds h; `open` (empty,
 //              or one a row) leaves out rows where it is 0
-// Accuracy     no constraint is broken by more than 1e-12 of the largest |h| or of |z|; rows should be of the
+// Accuracy     no constraint is broken by more than 1e-11 of the largest |h| or of |z|; rows should be of the
 //              order of 1
 // Cost         O(m) for each of some ten exchanges
 // Allocation   none

@@ -19,7 +19,8 @@ constexpr double tukey_factor = 4.685;     // 95 % efficient on normal noise
 constexpr double sigma_from_mad = 1.4826;  // of normal noise
 constexpr double weak_ratio = 5;
 constexpr double penetration_mm = 1e-9;
-constexpr double least_damping = 1e-6, first_damping = 1e-3, most_damping = 1e6;
+constexpr double least_damping = 1e-6, first_damping = 1e-3, more_damping = 30, most_damping = 1e12;
+constexpr double coarse_mm = 1e-3;  // enough to tell which points stand beyond the border
 
 // Fixed unknowns stay in the equations, uncoupled and stiffer than all the others together: their steps are
 // zero, and their eigenvalues come last.
@@ -121,9 +122,10 @@ class Alignment {
     const auto& spread = system_.moments().spread;
     if (!(spread[1] > flat_spread * spread[2])) return failed(Error::collinear);
     if (free_.count > 0) {
-      if (!settle()) return failed(Error::not_converged);
+      if (!settle(coarse_mm)) return failed(Error::not_converged);
+      const bool coarse = sums_.beyond_border > 0;
       beyond_ = system_.leave_out_beyond(settings_.border_tolerance_mm);
-      if (beyond_ > 0 && !settle()) return failed(Error::not_converged);
+      if (coarse && !settle(settings_.settled_mm)) return failed(Error::not_converged);
       if (settings_.robust && !settle_robustly()) return failed(Error::not_converged);
     }
     if (settings_.side != AllowedSide::both) {
@@ -164,7 +166,10 @@ class Alignment {
     pose_.translation() = centre + shift - pose_.linear() * system_.moments().centroid;
   }
 
-  bool settle() {
+  // The tangent planes that continue the design beyond its border turn when feet move along the border, which
+  // the equations leave out. While such points take part, steps below coarse_mm are therefore not asked for a
+  // lower sum, and it is enough to settle within `beyond_mm`.
+  bool settle(double beyond_mm) {
     double damping = 0;
     sums_ = pass();
     while (iterations_ < settings_.most_iterations) {
@@ -172,15 +177,16 @@ class Alignment {
       if (!step.allFinite()) return false;
       const RigidMotion before = pose_;
       move(step);
-      if (step.norm() < settings_.settled_mm)
+      const double length = step.norm();
+      if (length < (sums_.beyond_border > 0 ? beyond_mm : settings_.settled_mm))
         return true;  // what is left is far below; no need to look again
       const PointPlaneSums next = pass();
-      if (next.square <= sums_.square) {
+      if (next.square <= sums_.square || length < coarse_mm) {
         sums_ = next;
         damping = damping > least_damping ? 0.1 * damping : 0;
       } else {
         pose_ = before;
-        damping = std::max(first_damping, 10 * damping);
+        damping = std::max(first_damping, more_damping * damping);
         if (damping > most_damping) return false;
       }
     }

@@ -13,13 +13,17 @@ namespace moldloft::bench {
 // Each in a file of its own, bench/NAME.cpp.
 Json run_edges(const Options&);
 Json run_fit(const Options&);
+Json run_localize(const Options&);
+Json run_project(const Options&);
 Json run_thesis(const Options&);
 
 std::span<const Benchmark> all_benchmarks() {
   static const std::vector<Benchmark> all{
       {"fit", "surface fit: floors, nets, choice of the net, bad data, growth", run_fit},
-      {"thesis", "chapter 6 of the thesis again: wave, hood, fuselage, plate, tables 6.1 to 6.3", run_thesis},
+      {"project", "foot points with a guess and from nowhere", run_project},
+      {"localize", "poses of measured points, and their deviations", run_localize},
       {"edges", "the plate's edge in one shot", run_edges},
+      {"thesis", "chapter 6 of the thesis again: wave, hood, fuselage, plate, tables 6.1 to 6.3", run_thesis},
   };
   return all;
 }

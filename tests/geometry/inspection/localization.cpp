@@ -1,6 +1,7 @@
 #include "geometry/inspection/localization.hpp"
 
 #include <doctest/doctest.h>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include <algorithm>
@@ -146,8 +147,8 @@ TEST_CASE("the covariance is the scatter of poses over seeded noise") {
     covariance = found->covariance;
     mahalanobis += off.dot(Eigen::Matrix<double, 6, 6>(covariance).inverse() * off) / runs;
   }
-  // A variance from n normal samples scatters by sqrt(2 / n) of itself, a chi square of 6 degrees by sqrt(12); 4.5
-  // times that is not reached once in 1e5.
+  // A variance from n normal samples scatters by sqrt(2 / n) of itself, a chi square of 6 degrees by
+  // sqrt(12); 4.5 times that is not reached once in 1e5.
   for (int k = 0; k < 6; ++k)
     CHECK(std::abs(scatter(k, k) / covariance(k, k) - 1) < 4.5 * std::sqrt(2.0 / runs));
   CHECK(std::abs(mahalanobis - 6) < 4.5 * std::sqrt(12.0 / runs));

@@ -32,7 +32,8 @@ Seen seen_at(const PreparedSurface& design, const std::vector<Vector3d>& points,
   return seen;
 }
 
-// A plate that differs from its design by up to about half a millimetre, smoothly, with measuring noise on top.
+// A plate that differs from its design by up to about half a millimetre, smoothly, with measuring noise on
+// top.
 std::vector<Vector3d> formed_plate(const BSplineSurface& design, int count) {
   std::mt19937 random(21);
   std::uniform_real_distribution<double> inside(0.03, 0.97);
@@ -46,8 +47,8 @@ std::vector<Vector3d> formed_plate(const BSplineSurface& design, int count) {
   return points;
 }
 
-// Karush, Kuhn and Tucker: the slope of the sum of squares is carried by pushing contacts alone. What is left of it, per
-// point and in mm, is how far a step that settles (1e-6 mm) may be off.
+// Karush, Kuhn and Tucker: the slope of the sum of squares is carried by pushing contacts alone. What is left
+// of it, per point and in mm, is how far a step that settles (1e-6 mm) may be off.
 void check_optimal(const Seen& seen, const Localization& found, double sign, double tolerance_mm) {
   Eigen::Matrix<double, 6, 1> slope = Eigen::Matrix<double, 6, 1>::Zero();
   for (std::size_t i = 0; i < seen.mm.size(); ++i) slope += seen.mm[i] * seen.rows[i];
@@ -110,8 +111,8 @@ TEST_CASE("a bound that the free pose keeps changes nothing") {
 }
 
 TEST_CASE("a plate on three feet stands on them") {
-  // A flat design, a flat plate, and three bumps below it: with the slides fixed the plane through their tips is the
-  // answer, for any tilt about two of them brings the far side up.
+  // A flat design, a flat plate, and three bumps below it: with the slides fixed the plane through their tips
+  // is the answer, for any tilt about two of them brings the far side up.
   const auto flat = PreparedSurface::from(plate(4, 300, [](double, double) { return 0.0; }));
   std::vector<Vector3d> points;
   for (int i = 0; i < 20; ++i) {

@@ -106,8 +106,8 @@ TEST_CASE("where x and y are linear the plan view's guess is exact") {
 }
 
 TEST_CASE("where the plan view is bent the guess is off by the second order of a table cell") {
-  // x = 300 u + 20 u v, y = 300 v: of the inverse u = x / (300 + y / 15) only u_yy and u_xy are not zero, and what is
-  // interpolated bilinearly errs by h^2 / 8 u_yy at the most.
+  // x = 300 u + 20 u v, y = 300 v: of the inverse u = x / (300 + y / 15) only u_yy and u_xy are not zero, and
+  // what is interpolated bilinearly errs by h^2 / 8 u_yy at the most.
   BSplineSurface surface = plate(10, 300, [](double x, double y) { return 0.01 * x + 0.02 * y; });
   for (int i = 0; i < surface.control_u(); ++i) {
     for (int j = 0; j < surface.control_v(); ++j)
