@@ -11,10 +11,12 @@
 namespace moldloft::bench {
 
 // Each in a file of its own, bench/NAME.cpp.
+Json run_curvature(const Options&);
 Json run_edges(const Options&);
 
 std::span<const Benchmark> all_benchmarks() {
   static const std::vector<Benchmark> all{
+      {"curvature", "curvature maps, contours, and the fit whose parameters are not known", run_curvature},
       {"edges", "the plate's edge in one shot", run_edges},
   };
   return all;
