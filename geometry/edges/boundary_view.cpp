@@ -57,6 +57,7 @@ std::size_t BoundaryViewer::bytes() const {
 void BoundaryViewer::collect_ends(std::span<const PlateRun> runs) {
   ends_.clear();
   for (const PlateRun& run : runs) {
+    if (!run.edge_first.allFinite() || !run.edge_last.allFinite()) continue;
     if (ends_.empty() || ends_.back().stripe != run.stripe) {
       if (ends_.size() == ends_.capacity()) return;
       ends_.push_back({.stripe = run.stripe,

@@ -2,13 +2,16 @@
 // (the plate on the left), cut into pieces where the boundary runs out of the field, and what each piece is:
 // a side or a corner.
 //
-// A region's boundary goes along the lower ends of its runs with the stripes ascending and back along the upper ends.
-// Where the region begins or ends with a stripe inside the field, the boundary lies hidden between two parallel
-// stripes (thesis section 5.3.2); the piece is then marked as hidden there and the scanner has to be turned.
+// A region's boundary goes along the lower ends of its runs with the stripes ascending and back along the
+// upper ends. Where the region begins or ends with a stripe inside the field, the boundary lies hidden
+// between two parallel stripes (thesis section 5.3.2); the piece is then marked as hidden there and the
+// scanner has to be turned.
 //
 // Frame        as the edge points are given: scanner coordinates, plan view decides
 // Cost         O(edge points), plus a split search of O(n log n) for corners
 // Allocation   in the constructor only
+// Failure      none: runs whose ends are no finite numbers are left out, and where nothing is seen the view
+//              is empty
 #pragma once
 
 #include <Eigen/Core>
@@ -57,8 +60,9 @@ class BoundaryViewer {
     std::span<const EdgePoint> points;
     std::span<const BoundaryPiece> pieces;  // longest first; empty when no edge is in the field
     bool plate_fills_field = false;  // no edge at all, and every stripe lies on the plate from end to end
-    // Where the region ends inside the field with a long stripe, the boundary runs unseen between this x and the next
-    // stripe: the plate ends within half a pitch of the value, seen even where no stripe shows an edge point.
+    // Where the region ends inside the field with a long stripe, the boundary runs unseen between this x and
+    // the next stripe: the plate ends within half a pitch of the value, seen even where no stripe shows an
+    // edge point.
     std::optional<double> hidden_low_x_mm, hidden_high_x_mm;
   };
   View look(std::span<const PlateRun> runs, std::size_t stripe_count,

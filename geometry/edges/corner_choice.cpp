@@ -85,10 +85,18 @@ void CornerChoice::begin(std::span<const Vector2d> edges, std::span<const Vector
   candidates_ = candidates.first(std::min(candidates.size(), settings_.max_candidates));
   chosen_.clear();
   next_ = 0;
+  checked_ = false;
 }
 
 std::expected<bool, Error> CornerChoice::step() {
-  if (candidates_.empty()) return std::unexpected(Error::too_few_points);
+  if (candidates_.empty() || edges_.size() < 2 * fewest_points) return std::unexpected(Error::too_few_points);
+  if (!checked_) {
+    const auto is_finite = [](const Vector2d& p) { return p.allFinite(); };
+    if (!std::ranges::all_of(candidates_, is_finite) || !std::ranges::all_of(edges_, is_finite))
+      return std::unexpected(Error::not_finite);
+    checked_ = true;
+    return false;
+  }
   if (next_ < candidates_.size()) {
     if (const auto corner = examine(candidates_[next_++])) keep(*corner);
     return false;

@@ -1,14 +1,17 @@
 // Which of the corners that a tracker believes to have seen are corners of the plate.
 //
-// A tracker looks at one field at a time: a notch, a saw tooth of a torn edge or a tack weld looks like a corner there.
-// Seen from farther away the boundary goes straight on past a false corner and turns at a true one. So each candidate
-// is looked at with the edge points in a ring around it: two branches leave it, each is fitted by a line, the lines
-// give the turn and, where they meet, the corner itself. Candidates that come to lie together are one.
+// A tracker looks at one field at a time: a notch, a saw tooth of a torn edge or a tack weld looks like a
+// corner there. Seen from farther away the boundary goes straight on past a false corner and turns at a true
+// one. So each candidate is looked at with the edge points in a ring around it: two branches leave it, each
+// is fitted by a line, the lines give the turn and, where they meet, the corner itself. Candidates that come
+// to lie together are one.
 //
 // Frame        plan view, mm
-// Work         step() examines one candidate: one pass over the edge points, about 5 ns a point
+// Work         step() looks whether all are numbers, then examines one candidate a step: one pass over the
+//              edge points, about 5 ns a point
 // Allocation   in the constructor only
-// Failure      Error::not_four_sided when other than four are left, too_few_points without candidates
+// Failure      Error::not_four_sided when other than four are left, too_few_points without candidates or edge
+//              points, not_finite when one of them is no number
 #pragma once
 
 #include <Eigen/Core>
@@ -56,6 +59,7 @@ class CornerChoice {
   std::vector<Corner> chosen_;
   std::array<Eigen::Vector2d, 4> corners_;
   std::size_t next_ = 0;
+  bool checked_ = false;
 };
 
 }  // namespace moldloft::geometry

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <limits>
 
@@ -69,6 +70,7 @@ constexpr double false_point_mm =
 }  // namespace
 
 EdgeLine fit_edge_line(std::span<const EdgePoint> points) {
+  assert(points.size() >= 2);
   const Eigen::Vector2d origin = plan(points.front());
   EdgeLine line;
   double scale = std::numeric_limits<double>::infinity();
@@ -100,10 +102,12 @@ EdgeLine fit_edge_line(std::span<const EdgePoint> points) {
 
 std::optional<Eigen::Vector2d> meeting_point(const EdgeLine& a, const EdgeLine& b) {
   const double cross = a.direction.x() * b.direction.y() - a.direction.y() * b.direction.x();
-  if (std::abs(cross) < 0.03) return std::nullopt;
+  if (!(std::abs(cross) >= 0.03)) return std::nullopt;
   const Eigen::Vector2d d = b.centre - a.centre;
   const double along = (d.x() * b.direction.y() - d.y() * b.direction.x()) / cross;
-  return a.centre + along * a.direction;
+  const Eigen::Vector2d meeting = a.centre + along * a.direction;
+  if (!meeting.allFinite()) return std::nullopt;
+  return meeting;
 }
 
 bool is_false_point(std::span<const EdgePoint> points, std::size_t index) {
@@ -141,6 +145,7 @@ std::size_t best_split(std::span<const EdgePoint> points, std::size_t min_side) 
 }
 
 std::size_t split_at_farthest(std::span<const EdgePoint> points, double length_mm, std::size_t min_side) {
+  if (points.size() < 2 * min_side) return 0;
   const Eigen::Vector2d a = plan(points.front()), d = plan(points.back()) - a;
   std::size_t farthest = 0;
   double most = 0;

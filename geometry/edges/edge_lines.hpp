@@ -27,11 +27,13 @@ struct EdgeLine {
 // 2 points.
 EdgeLine fit_edge_line(std::span<const EdgePoint> points);
 
-// Where two lines meet. Lines within 0.03 rad of parallel give nothing.
+// Where two lines meet. Lines within 0.03 rad of parallel give nothing, nor do lines that are no finite
+// numbers.
 std::optional<Eigen::Vector2d> meeting_point(const EdgeLine&, const EdgeLine&);
 
-// True when the point at `index` lies on neither the line of its five predecessors nor that of its five successors: a
-// corner's points always lie on one of them. Near an end the four outermost points stand for what is missing.
+// True when the point at `index` lies on neither the line of its five predecessors nor that of its five
+// successors: a corner's points always lie on one of them. Near an end the four outermost points stand for
+// what is missing.
 bool is_false_point(std::span<const EdgePoint> points, std::size_t index);
 
 // The split s for which the two lines through points [0, s) and [s, n) leave the smallest sum of squares,

@@ -88,6 +88,8 @@ std::expected<void, Error> OutlineBuilder::begin(std::span<const Eigen::Vector2d
   if (corner_hints.size() != 4) return std::unexpected(Error::not_four_sided);
   if (points.size() > side_of_.capacity()) return std::unexpected(Error::capacity);
   if (points.size() < 4 * fewest_points) return std::unexpected(Error::too_few_points);
+  if (!std::ranges::all_of(points, [](const Eigen::Vector2d& p) { return p.allFinite(); }))
+    return std::unexpected(Error::not_finite);
   double area = 0;
   for (int i = 0; i < 4; ++i) {
     if (!corner_hints[i].allFinite()) return std::unexpected(Error::not_finite);

@@ -6,9 +6,11 @@
 // neighbouring sides are extended to meet, and the meeting point is the corner.
 //
 // Frame        world, plan view (x, y), mm
-// Work         step() does one bounded piece (one pass over one side's points); the caller decides how many a tick
+// Work         step() does one bounded piece (one pass over one side's points); the caller decides how many a
+//              tick
 // Allocation   in the constructor only
-// Failure      Error::not_four_sided, too_few_points (a side without points), collinear (sides that do not meet)
+// Failure      Error::not_four_sided (hints), too_few_points (in all, or a side without points), not_finite,
+//              collinear (hints that span no area or go clockwise, sides that do not meet), capacity
 #pragma once
 
 #include <Eigen/Core>
@@ -18,8 +20,8 @@
 #include <span>
 #include <vector>
 
-#include "geometry/splines/bspline.hpp"
 #include "geometry/error.hpp"
+#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
 

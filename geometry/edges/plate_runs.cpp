@@ -325,6 +325,7 @@ std::expected<bool, Error> PlateRunFinder::cut_stripes(std::size_t at_most,
 
 std::expected<std::span<const PlateRun>, Error> PlateRunFinder::finish(const Eigen::Vector3d& hint,
                                                                        const PlateRunSettings& settings) {
+  if (!hint.allFinite()) return std::unexpected(Error::not_finite);
   const std::span<const StripeView> stripes = stripes_;
   first_run_.push_back(static_cast<std::uint32_t>(runs_.size()));
   link_stripes(stripes, settings);

@@ -12,8 +12,8 @@
 //              deviation 0.29 spacings along the stripe
 // Cost         O(points); 50,000 points in 100 stripes take about 0.4 ms (moldloft-bench edges)
 // Allocation   in the constructor only
-// Failure      Error::not_on_plate when the hint hits nothing, Error::capacity when the frame is larger than
-//              planned
+// Failure      Error::not_on_plate when the hint hits nothing, not_finite when the hint is no number,
+//              capacity when the frame is larger than planned
 #pragma once
 
 #include <Eigen/Core>

@@ -14,6 +14,8 @@ constexpr int newton_steps = 25;  // 2-3 are usual; a wild start needs its steps
 constexpr double longest_step =
     0.25;  // of the unit square: keeps a wild start inside the map's neighbourhood
 
+constexpr double least_corner_sine = 1e-9;  // between the two sides that meet in a corner
+
 // A side's control point i when the side is walked in the map's direction.
 Eigen::Vector2d control(const PlanCurve& side, bool reversed, int i) {
   return reversed ? side.control[side.control.size() - 1 - i] : side.control[i];
@@ -101,6 +103,14 @@ PlanPoint PlanMap::at(double u, double v) const {
 }
 
 std::expected<void, Error> PlanMap::check() const {
+  // A corner of 180 degrees has no Jacobian, and rounding would decide its sign.
+  for (const Eigen::Vector2d& corner : {Eigen::Vector2d(0, 0), {1, 0}, {1, 1}, {0, 1}}) {
+    const Eigen::Matrix2d jacobian = at(corner.x(), corner.y()).jacobian;
+    const double largest = jacobian.col(0).norm() * jacobian.col(1).norm();
+    if (!std::isfinite(largest)) return std::unexpected(Error::not_finite);
+    if (std::abs(jacobian.determinant()) <= least_corner_sine * largest)
+      return std::unexpected(Error::collinear);
+  }
   constexpr int grid = 64;
   for (int i = 0; i <= grid; ++i) {
     for (int j = 0; j <= grid; ++j) {
