@@ -1,5 +1,5 @@
-// What a CAD file says about itself besides the shape. Everything comes from the caller: this room knows no clock, so
-// the same face and label give the same bytes.
+// What a CAD file says about itself besides the shape. Everything comes from the caller: this room knows no
+// clock, so the same face and label give the same bytes.
 //
 // Text is UTF-8. STEP keeps all of it; IGES has printable ASCII only and shows '?' for the rest.
 #pragma once
@@ -19,9 +19,9 @@ struct CadLabel {
   std::string system = "Moldloft";
   std::string author = {}, organization = {};
   CadStamp stamp = {};
-  // How far edges, corners and surface may lie apart and still be one: the uncertainty that the file states, and the
-  // bound on the space curves of trims. It says nothing of how well the plate was measured. The default is the
-  // resolution of the common modelling kernels (1e-8 m).
+  // How far edges, corners and surface may lie apart and still be one: the uncertainty that the file states,
+  // and the bound on the space curves of trims. It says nothing of how well the plate was measured. The
+  // default is the resolution of the common modelling kernels (1e-8 m).
   double closure_mm = 1e-5;
 };
 

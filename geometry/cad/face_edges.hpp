@@ -1,7 +1,7 @@
 // A face made ready for writing: every loop with the space curves of its edges.
 //
-// Accuracy     a space curve is the one that the face gives, a border row of the net bit for bit, or an image within
-//              the tolerance (splines/trimmed_surface.hpp)
+// Accuracy     a space curve is the one that the face gives, a border row of the net bit for bit, or an image
+//              within the tolerance (splines/trimmed_surface.hpp)
 // Allocation   yes
 // Failure      what check() of trimmed_surface.hpp finds
 #pragma once

@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::size_t line_width = 80;
 
-// Breaks a statement after commas, and between the parts of a complex instance; never inside a string, where a line's
-// end would be lost.
+// Breaks a statement after commas, and between the parts of a complex instance; never inside a string, where
+// a line's end would be lost.
 void append_wrapped(std::string& out, std::string_view statement) {
   std::size_t line_start = 0, last_break = 0;
   bool quoted = false;
@@ -139,7 +139,8 @@ Ref bound(StepText& step, const FaceLoop& loop, Ref surface, Ref plane_of_parame
   return step.add(outer ? "FACE_OUTER_BOUND" : "FACE_BOUND", {"''", around.text(), ".T."});
 }
 
-// The product that the shape is of, as every system expects it; returns what the shape's representation refers to.
+// The product that the shape is of, as every system expects it; returns what the shape's representation
+// refers to.
 Ref product(StepText& step, const CadLabel& label) {
   const Ref application = step.add("APPLICATION_CONTEXT", {"'managed model based 3d engineering'"});
   step.add(

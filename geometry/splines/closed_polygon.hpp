@@ -1,9 +1,10 @@
-// Closed polygons in a plane: what an outline or a loop of trim curves is once its curves are cut into chords. The
-// last point is joined to the first; it is not repeated.
+// Closed polygons in a plane: what an outline or a loop of trim curves is once its curves are cut into
+// chords. The last point is joined to the first; it is not repeated.
 //
 // Frame        any; lengths in the caller's unit
 // Accuracy     signed_area within 4 n eps times the square of the polygon's extent
-// Cost         signed_area and contains O(n); crosses_itself O(n^2) in the worst case, O(n) boxes looked at for each edge
+// Cost         signed_area and contains O(n); crosses_itself O(n^2) in the worst case, O(n) boxes looked at
+//              for each edge
 // Allocation   none
 // Failure      none: a polygon of fewer than three points has no area, contains nothing and crosses nothing
 #pragma once

@@ -71,8 +71,8 @@ inline geometry::PlanCurve bow(const Eigen::Vector2d& a, const Eigen::Vector2d& 
           {a, a + d / 3 + bulge * right, a + 2 * d / 3 + bulge * right, b}};
 }
 
-// The bent plate cut to a shape of three bows, with an elliptic hole and a hole of two bows, one of which is stored the
-// other way round.
+// The bent plate cut to a shape of three bows, with an elliptic hole and a hole of two bows, one of which is
+// stored the other way round.
 inline geometry::TrimmedSurface trimmed_plate() {
   const Eigen::Vector2d a(0.1, 0.15), b(0.9, 0.2), c(0.45, 0.92), d(0.4, 0.6), e(0.55, 0.62);
   geometry::TrimmedSurface face{.surface = bent_plate()};

@@ -1,5 +1,5 @@
-// A STEP file taken apart: instances by their number, each a type and its parameters as text. For files of ours: one
-// level of parentheses is enough to be told apart, complex instances keep theirs as one text.
+// A STEP file taken apart: instances by their number, each a type and its parameters as text. For files of
+// ours: one level of parentheses is enough to be told apart, complex instances keep theirs as one text.
 #pragma once
 
 #include <cstdlib>
