@@ -145,25 +145,26 @@ std::expected<void, Error> SurfaceFit::add(std::span<const Eigen::Vector3d> worl
   if (!(weight > 0) || !std::isfinite(weight)) return std::unexpected(Error::not_finite);
   PointBlock& block = work.block;
   block.weighted = weight != 1;
-  for (const Eigen::Vector3d& point : world_points) {
-    if (!point.allFinite()) {
-      ++work.report.points_off;
-      continue;
+  std::array<double, PointBlock::capacity> x, y;
+  for (std::size_t first = 0; first < world_points.size(); first += x.size()) {
+    const auto points = world_points.subspan(first, std::min(x.size(), world_points.size() - first));
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      // A height that is not finite sends its point off the plate.
+      x[k] = std::isfinite(points[k].z()) ? points[k].x() : points[k].z(), y[k] = points[k].y();
     }
-    const auto uv = work.map->invert(point.head<2>(), work.last_uv);
-    if (!uv) {
-      ++work.report.points_off;
-      continue;
+    work.report.points_off += work.map->invert({x.data(), points.size()}, {y.data(), points.size()},
+                                               {work.u.data(), points.size()}, {work.v.data(), points.size()},
+                                               work.last_uv);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      if (std::isnan(work.u[k])) continue;
+      if (work.totals.points == 0 && block.count == 0) work.datum = points[k].z();
+      const auto to = static_cast<std::size_t>(block.count++);
+      // Rounding may put a point of the rim outside by a hair.
+      work.u[to] = std::clamp(work.u[k], 0.0, 1.0), work.v[to] = std::clamp(work.v[k], 0.0, 1.0);
+      block.height[to] = points[k].z() - work.datum, block.weight[to] = weight;
     }
-    work.last_uv = *uv;
-    if (work.totals.points == 0 && block.count == 0) work.datum = point.z();
-    const int k = block.count++;
-    // Rounding may put a point of the rim outside by a hair.
-    work.u[k] = std::clamp(uv->x(), 0.0, 1.0), work.v[k] = std::clamp(uv->y(), 0.0, 1.0);
-    block.height[k] = point.z() - work.datum, block.weight[k] = weight;
-    if (block.count == PointBlock::capacity) work.fold(shot);
+    work.fold(shot);
   }
-  work.fold(shot);
   return {};
 }
 
