@@ -14,8 +14,8 @@ enum class Error {
   outside_domain,  // a point to which no (u, v) belongs
   singular,        // the normal equations have no positive pivot
   knots_not_increasing,
-  capacity,      // more data than the memory plan holds
-  empty_cells,      // cells without points, and no fairing to hold the surface there
+  capacity,     // more data than the memory plan holds
+  empty_cells,  // cells without points, and no fairing to hold the surface there
   negative_weight,
   not_on_plate,  // the hint does not lie on anything that was measured
 };

@@ -154,8 +154,8 @@ std::expected<Eigen::Vector2d, Error> PlanMap::invert(const Eigen::Vector2d& xy,
 
 // Eight points in one span of either direction, from the map's tangent plane at `guess`. False where that does not hold, or
 // a point lies beyond the sides: then one goes point by point.
-bool PlanMap::invert_eight(const double* x, const double* y, double* u, double* v, const Eigen::Vector2d& guess,
-                           Simd simd) const {
+bool PlanMap::invert_eight(const double* x, const double* y, double* u, double* v,
+                           const Eigen::Vector2d& guess, Simd simd) const {
   const PlanPoint at_guess = at(guess.x(), guess.y());
   const Eigen::Matrix2d& j = at_guess.jacobian;
   const double det = j(0, 0) * j(1, 1) - j(0, 1) * j(1, 0), spans = static_cast<double>(along_u_.size());
@@ -174,17 +174,19 @@ bool PlanMap::invert_eight(const double* x, const double* y, double* u, double* 
   };
   const int a = span_of(low_u), b = span_of(low_v);
   if (span_of(high_u) != a || span_of(high_v) != b) return false;
-  const PlanSpan span{.along_u = along_u_[a].coefficient,
-                      .along_v = along_v_[b].coefficient,
-                      .spans = spans,
-                      .first_u = double(a),
-                      .first_v = double(b),
-                      .corner = {{c00_.x(), c00_.y()}, {c10_.x(), c10_.y()}, {c01_.x(), c01_.y()}, {c11_.x(), c11_.y()}},
-                      .tolerance = batch_tolerance_mm,
-                      .most_steps = 6};
+  const PlanSpan span{
+      .along_u = along_u_[a].coefficient,
+      .along_v = along_v_[b].coefficient,
+      .spans = spans,
+      .first_u = double(a),
+      .first_v = double(b),
+      .corner = {{c00_.x(), c00_.y()}, {c10_.x(), c10_.y()}, {c01_.x(), c01_.y()}, {c11_.x(), c11_.y()}},
+      .tolerance = batch_tolerance_mm,
+      .most_steps = 6};
   if (!plan_map_kernel(simd).invert_eight(span, x, y, u, v)) return false;
   for (int k = 0; k < 8; ++k) {
-    if (!(u[k] * spans >= a && u[k] * spans <= a + 1 && v[k] * spans >= b && v[k] * spans <= b + 1)) return false;
+    if (!(u[k] * spans >= a && u[k] * spans <= a + 1 && v[k] * spans >= b && v[k] * spans <= b + 1))
+      return false;
   }
   return true;
 }

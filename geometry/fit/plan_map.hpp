@@ -46,8 +46,9 @@ class PlanMap {
   // The same for a batch of neighbours, such as a stripe: u[k], v[k] for every x[k], y[k], eight at a time. A point that
   // has none gets NaN. `guess` is that of the first point and is left at the last one's. Bits do not depend on the
   // machine's vector unit. Returns how many points have none.
-  std::size_t invert(std::span<const double> x, std::span<const double> y, std::span<double> u, std::span<double> v,
-                     Eigen::Vector2d& guess, double margin = 0.0, Simd = widest_simd()) const;
+  std::size_t invert(std::span<const double> x, std::span<const double> y, std::span<double> u,
+                     std::span<double> v, Eigen::Vector2d& guess, double margin = 0.0,
+                     Simd = widest_simd()) const;
 
   const Outline& outline() const { return outline_; }
 
