@@ -36,7 +36,8 @@ class CellLookup {
   bool holds(double t) const { return t >= begins_.front() && t <= end_; }
   // The cell and, in `local`, the place in it, 0..1. `t` must be held.
   int find(double t, double& local) const {
-    const int bucket = std::min(static_cast<int>((t - begins_.front()) * scale_), static_cast<int>(first_.size()) - 1);
+    const int bucket =
+        std::min(static_cast<int>((t - begins_.front()) * scale_), static_cast<int>(first_.size()) - 1);
     int k = first_[bucket];
     const int last = static_cast<int>(begins_.size()) - 1;
     while (k < last && t >= begins_[k + 1]) ++k;

@@ -28,7 +28,7 @@ std::vector<double> stretched(int spans, double begin, double end) {
 // One net over the same points: its cells' moments and its equations.
 struct Candidate {
   SplineNet net;
-  std::vector<double> knots_u, knots_v;  // of the surface; the net may live on [0, 1]
+  std::vector<double> knots_u, knots_v;   // of the surface; the net may live on [0, 1]
   std::optional<MomentGrid> merged = {};  // nothing: the points' own cells
   std::vector<double> coefficients = {};
   NetResult result = {};
@@ -86,7 +86,8 @@ std::size_t first_empty_cell(const MomentGrid& grid) {
 // The control point (row, column) of an unknown.
 std::pair<int, int> control_of(const SplineNet& net, int unknown) {
   const int fast = net.v_is_fast() ? net.control_v() : net.control_u();
-  return net.v_is_fast() ? std::pair(unknown / fast, unknown % fast) : std::pair(unknown % fast, unknown / fast);
+  return net.v_is_fast() ? std::pair(unknown / fast, unknown % fast)
+                         : std::pair(unknown % fast, unknown / fast);
 }
 
 FittedSurface assemble(const Candidate& chosen, double datum) {
@@ -122,7 +123,8 @@ std::vector<double> knots_at(const std::vector<int>& bounds) {
 // All nets of one fit, and room for the largest of their systems.
 class Fitter {
  public:
-  Fitter(const FitSettings& settings, const MomentAccumulator& finest) : settings_(settings), finest_(finest) {
+  Fitter(const FitSettings& settings, const MomentAccumulator& finest)
+      : settings_(settings), finest_(finest) {
     candidates_.push_back(candidate(settings, finest.grid().cells_u(), finest.grid().cells_v()));
   }
 
@@ -149,7 +151,8 @@ class Fitter {
       if (const auto good = try_between(); !good) return good;
     }
     // The solver still holds the last net's factor.
-    if (settings_.condition && &candidates_.back() != &candidates_[chosen_]) return solve(candidates_[chosen_]);
+    if (settings_.condition && &candidates_.back() != &candidates_[chosen_])
+      return solve(candidates_[chosen_]);
     return {};
   }
 
@@ -172,7 +175,8 @@ class Fitter {
     report.smallest_pivot = result.smallest_pivot;
     std::tie(report.smallest_pivot_i, report.smallest_pivot_j) =
         control_of(chosen().net, result.smallest_pivot_unknown);
-    if (settings_.condition) report.condition = solver_->norm_one() * estimated_inverse_norm(solver_->factor());
+    if (settings_.condition)
+      report.condition = solver_->norm_one() * estimated_inverse_norm(solver_->factor());
     for (const Candidate& c : candidates_) report.nets.push_back(score(c));
     report.chosen = chosen_;
     report.freedom = result.freedom;
@@ -211,7 +215,8 @@ class Fitter {
           spans_v > finest.cells_v() / 2) {
         continue;
       }
-      const std::vector<int> at_u = nearly_equal(finest.cells_u(), spans_u), at_v = nearly_equal(finest.cells_v(), spans_v);
+      const std::vector<int> at_u = nearly_equal(finest.cells_u(), spans_u),
+                             at_v = nearly_equal(finest.cells_v(), spans_v);
       std::vector<double> knots_u = knots_at(at_u), knots_v = knots_at(at_v);
       SplineNet net(knots_u, knots_v);
       if (static_cast<double>(totals_.points) < points_an_unknown * net.unknowns()) continue;
@@ -328,19 +333,21 @@ std::vector<std::array<double, 16>> bezier_cells(const Candidate& c, const Momen
     }
     return all;
   };
-  const std::vector<Part> u = parts(c.net.spans_u(), grid.cells_u()), v = parts(c.net.spans_v(), grid.cells_v());
+  const std::vector<Part> u = parts(c.net.spans_u(), grid.cells_u()),
+                          v = parts(c.net.spans_v(), grid.cells_v());
   std::vector<std::array<double, 16>> cells;
   for (const Part& a : u) {
     for (const Part& b : v) {
-      add_restricted<3>(a.turned, b.turned, c.net.bezier(c.coefficients, a.cell, b.cell), cells.emplace_back());
+      add_restricted<3>(a.turned, b.turned, c.net.bezier(c.coefficients, a.cell, b.cell),
+                        cells.emplace_back());
     }
   }
   return cells;
 }
 
 // Residuals of all points; with `weights_into`, the points are folded into it anew with Tukey's weights.
-ResidualPass residual_pass(const PointColumns& columns, const MomentAccumulator& cells_of, const Candidate& fitted,
-                           double scale, MomentAccumulator* weights_into) {
+ResidualPass residual_pass(const PointColumns& columns, const MomentAccumulator& cells_of,
+                           const Candidate& fitted, double scale, MomentAccumulator* weights_into) {
   const auto bezier = bezier_cells(fitted, cells_of.grid());
   PointColumns plain = columns;
   plain.weight = {};
@@ -378,18 +385,19 @@ std::expected<MomentAccumulator, FitFailure> accumulator_for(const FitSettings& 
   return MomentAccumulator(u, v, settings.domain, datum);
 }
 
-std::expected<FittedSurface, FitFailure> fit_moments(const MomentAccumulator& moments, const FitSettings& settings) {
+std::expected<FittedSurface, FitFailure> fit_moments(const MomentAccumulator& moments,
+                                                     const FitSettings& settings) {
   if (const auto good = check(settings); !good) return std::unexpected(good.error());
   Fitter fitter(settings, moments);
   if (const auto good = fitter.run(); !good) return std::unexpected(good.error());
   return fitter.result();
 }
 
-std::expected<FittedSurface, FitFailure> fit_surface(const PointColumns& columns, const FitSettings& asked) {
+std::expected<FittedSurface, FitFailure> fit_surface(const PointColumns& columns,
+                                                     const FitSettings& settings) {
   if (columns.size() == 0) return std::unexpected(FitFailure{Error::too_few_points});
   const double datum = columns.z[0];
   if (!std::isfinite(datum)) return std::unexpected(FitFailure{Error::not_finite, 0});
-  FitSettings settings = asked;
   auto moments = accumulator_for(settings, datum);
   if (!moments) return std::unexpected(moments.error());
   if (const auto added = moments->add(columns); !added) return std::unexpected(added.error());
@@ -398,37 +406,37 @@ std::expected<FittedSurface, FitFailure> fit_surface(const PointColumns& columns
   if (const auto good = fitter->run(); !good) return std::unexpected(good.error());
   FittedSurface out = fitter->result();
 
-  if (fitter->chose_between()) {
-    // The points are at hand: a second pass puts the chosen number of spans at even distances.
-    const FitReport first = out.report;
-    settings.control_u = out.surface.control_u(), settings.control_v = out.surface.control_v();
-    fitter.reset();
-    moments = accumulator_for(settings, datum);
-    if (const auto added = moments->add(columns); !added) return std::unexpected(added.error());
-    fitter.emplace(settings, *moments);
-    if (const auto good = fitter->run(); !good) return std::unexpected(good.error());
-    out = fitter->result();
-    out.report.nets = first.nets, out.report.chosen = first.chosen;
-    out.report.bytes = std::max(out.report.bytes, first.bytes);
-  }
-
-  Candidate fitted = fitter->chosen();
+  std::optional<MomentAccumulator> weighted;
   double scale = out.report.sigma;
   for (int pass = 0; pass < settings.robust_passes; ++pass) {
-    MomentAccumulator weighted = *accumulator_for(settings, datum);
-    const ResidualPass residuals = residual_pass(columns, *moments, fitted, scale, &weighted);
-    Fitter again(settings, weighted);
-    if (const auto good = again.run(); !good) return std::unexpected(good.error());
-    const double before = scale;
+    const Candidate before = fitter->chosen();
+    weighted.emplace(*accumulator_for(settings, datum));
+    const ResidualPass residuals = residual_pass(columns, *moments, before, scale, &*weighted);
+    fitter.emplace(settings, *weighted);
+    if (const auto good = fitter->run(); !good) return std::unexpected(good.error());
+    out = fitter->result();
+    const double scale_before = scale;
     scale = residuals.median.scale();
-    const double moved = difference(fitted, again.chosen());
-    out = again.result();
-    fitted = again.chosen();
     out.report.robust_passes = pass + 1, out.report.robust_sigma = scale;
-    if (pass > 0 && moved < robust_rest * scale && std::abs(scale - before) < robust_rest * scale) break;
+    const double moved = difference(before, fitter->chosen());
+    if (pass > 0 && moved < robust_rest * scale && std::abs(scale - scale_before) < robust_rest * scale)
+      break;
+  }
+  if (fitter->chose_between()) {
+    // The points are at hand: once more, with the chosen number of spans at even distances.
+    FitSettings even = settings;
+    even.control_u = out.surface.control_u(), even.control_v = out.surface.control_v();
+    fitter.reset();
+    moments = std::unexpected(FitFailure{});
+    weighted.reset();
+    auto again = fit_surface(columns, even);
+    if (!again) return again;
+    again->report.nets = out.report.nets, again->report.chosen = out.report.chosen;
+    again->report.bytes = std::max(again->report.bytes, out.report.bytes);
+    return again;
   }
   if (settings.residual_pass) {
-    out.report.max_residual = residual_pass(columns, *moments, fitted, 1, nullptr).largest;
+    out.report.max_residual = residual_pass(columns, *moments, fitter->chosen(), 1, nullptr).largest;
   }
   return out;
 }

@@ -37,22 +37,23 @@ struct FairingSettings {
 };
 
 struct BoundarySettings {
-  Eigen::MatrixXd control = {};  // control_u x control_v; only the outer ring is read; empty: the boundary is free
+  Eigen::MatrixXd control =
+      {};  // control_u x control_v; only the outer ring is read; empty: the boundary is free
   double weight = std::numeric_limits<double>::infinity();  // in points; infinite: interpolated
 };
 
 struct FitSettings {
-  int control_u = 0, control_v = 0;       // 0: chosen
-  std::vector<double> knots_u = {}, knots_v = {};   // given: they decide the net
-  FitDomain domain = {};                  // of the columns u and v, where no knots are given
-  double tolerance = 0;                   // what a coarser net may miss (rms), in the unit of z
+  int control_u = 0, control_v = 0;                // 0: chosen
+  std::vector<double> knots_u = {}, knots_v = {};  // given: they decide the net
+  FitDomain domain = {};                           // of the columns u and v, where no knots are given
+  double tolerance = 0;                            // what a coarser net may miss (rms), in the unit of z
   NetCriterion criterion = NetCriterion::gcv;
-  int finest_spans = 64;                  // of the nets to choose from; a power of two, at least 4
+  int finest_spans = 64;  // of the nets to choose from; a power of two, at least 4
   FairingSettings fairing = {};
-  BoundarySettings boundary = {};         // for a given net only
-  int robust_passes = 0;                  // at most so many of Tukey's reweighting; 0: plain least squares
-  bool residual_pass = false;             // one more pass over the points, for their largest residual
-  bool condition = false;                 // estimate it
+  BoundarySettings boundary = {};  // for a given net only
+  int robust_passes = 0;           // at most so many of Tukey's reweighting; 0: plain least squares
+  bool residual_pass = false;      // one more pass over the points, for their largest residual
+  bool condition = false;          // estimate it
 };
 
 struct FitReport {
@@ -60,15 +61,15 @@ struct FitReport {
   double rms_residual = 0, sigma = 0;  // weighted; sigma: over the degrees of freedom
   double max_residual = 0;             // 0 unless residual_pass
   int empty_cells = 0, sparse_cells = 0;
-  double smallest_pivot = 0;           // relative to the largest: small means a badly determined control point,
+  double smallest_pivot = 0;  // relative to the largest: small means a badly determined control point,
   int smallest_pivot_i = 0, smallest_pivot_j = 0;  // this one
-  double condition = 0;                // estimate of the 1-norm condition of the normal equations, 0 unless asked for
-  std::vector<NetScore> nets;          // all that were tried, from fine to coarse
-  std::size_t chosen = 0;              // of them
-  double freedom = 0;                  // degrees of freedom of the surface: at most its control points
+  double condition = 0;        // estimate of the 1-norm condition of the normal equations, 0 unless asked for
+  std::vector<NetScore> nets;  // all that were tried, from fine to coarse
+  std::size_t chosen = 0;      // of them
+  double freedom = 0;          // degrees of freedom of the surface: at most its control points
   int robust_passes = 0;
-  double robust_sigma = 0;             // from the median residual
-  std::size_t bytes = 0;               // what the fit held at most, above the caller's points
+  double robust_sigma = 0;  // from the median residual
+  std::size_t bytes = 0;    // what the fit held at most, above the caller's points
 };
 
 struct FittedSurface {

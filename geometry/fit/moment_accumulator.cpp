@@ -10,7 +10,8 @@ namespace moldloft::geometry {
 
 namespace {
 
-std::expected<void, FitFailure> check_point(const PointColumns& columns, std::size_t i, const FitDomain& domain) {
+std::expected<void, FitFailure> check_point(const PointColumns& columns, std::size_t i,
+                                            const FitDomain& domain) {
   const double u = columns.u[i], v = columns.v[i], z = columns.z[i];
   const double w = columns.weight.empty() ? 1 : columns.weight[i];
   if (!std::isfinite(u) || !std::isfinite(v) || !std::isfinite(z) || !std::isfinite(w)) {
@@ -48,11 +49,13 @@ std::expected<void, FitFailure> check_knots(std::span<const double> knots) {
     if (run > (at_end ? 4u : 3u)) return bad(i);
   }
   if (!(knots[cubic] == knots[0] && knots[cubic] < knots[cubic + 1])) return bad(cubic);
-  if (!(knots[last - cubic] == knots[last] && knots[last - cubic - 1] < knots[last])) return bad(last - cubic);
+  if (!(knots[last - cubic] == knots[last] && knots[last - cubic - 1] < knots[last]))
+    return bad(last - cubic);
   return {};
 }
 
-MomentAccumulator::MomentAccumulator(int cells_u, int cells_v, const FitDomain& domain, double datum, Simd simd)
+MomentAccumulator::MomentAccumulator(int cells_u, int cells_v, const FitDomain& domain, double datum,
+                                     Simd simd)
     : grid_(cells_u, cells_v), domain_(domain), datum_(datum), kernel_(&moment_kernel(simd)) {
   assert(domain.min_u < domain.max_u && domain.min_v < domain.max_v);
 }

@@ -29,7 +29,7 @@ namespace moldloft::geometry {
 
 // What is wrong with data, and where: the number of the point, knot, cell or coefficient that the error speaks of.
 struct FitFailure {
-  Error error;
+  Error error{};
   std::size_t where = 0;
   bool operator==(const FitFailure&) const = default;
 };

@@ -17,7 +17,7 @@ constexpr double choose(int n, int k) {
 
 template <int degree>
 struct Halves {
-  double rows[2][degree + 1][degree + 1] = {};  // [half][p][l]
+  double rows[2][degree + 1][degree + 1] = {};             // [half][p][l]
   double columns[2][degree + 1][degree < 4 ? 4 : 8] = {};  // [half][l][p], rows filled up with zeros
   constexpr Halves() {
     for (int p = 0; p <= degree; ++p) {
@@ -70,8 +70,11 @@ constexpr auto& half3_columns = halves3.columns;
 
 namespace moldloft::geometry {
 
-#define MOLDLOFT_KERNEL(simd, name) \
-  {simd, name::locate, name::values, name::fold, name::fold_shot, name::heights, name::merge, name::cell_gram}
+#define MOLDLOFT_KERNEL(simd, name)                                                            \
+  {                                                                                            \
+    simd, name::locate, name::values, name::fold, name::fold_shot, name::heights, name::merge, \
+        name::cell_gram                                                                        \
+  }
 
 const MomentKernel& moment_kernel(Simd simd) {
   assert(machine_has(simd));

@@ -42,7 +42,8 @@ inline double bayesian_information(const PointTotals& totals, const NetResult& r
 inline std::size_t choose_net(std::span<const NetScore> nets, NetCriterion criterion, double tolerance) {
   std::size_t best = 0;
   for (std::size_t k = 1; k < nets.size(); ++k) {
-    const bool better = criterion == NetCriterion::gcv ? nets[k].gcv <= nets[best].gcv : nets[k].bic <= nets[best].bic;
+    const bool better =
+        criterion == NetCriterion::gcv ? nets[k].gcv <= nets[best].gcv : nets[k].bic <= nets[best].bic;
     if (better) best = k;
   }
   const double limit = nets[best].gcv + tolerance * tolerance;

@@ -38,7 +38,7 @@ void NetSolver::start(const NetTask& task, ShotOffsets* shots) {
   result_.point_sigma_mm = task.point_sigma_mm;
   matrix_.reset(size(), task.net->half_band());
   trace_data_ = objective_ = border_squares_ = norm_one_ = 0;
-  cursor_ = column_ = row_ = 0;
+  cursor_ = column_ = row_ = 0, shot_cell_ = 0;
   phase_ = Phase::clear;
 }
 
@@ -177,10 +177,15 @@ void NetSolver::finish() {
 template <typename Piece>
 bool NetSolver::each_shot(double cost_of_cell, Piece&& piece) {
   while (cursor_ < shots_->count()) {
-    const double cost = 30 + cost_of_cell * static_cast<double>(shots_->cells_of(cursor_));
-    if (work_ > 0 && work_ + cost > work_a_step) return false;
-    piece(cursor_++);
-    work_ += cost;
+    const std::size_t all = shots_->cells_of(cursor_);
+    const auto room = static_cast<std::size_t>(std::max(0.0, work_a_step - work_) / cost_of_cell);
+    const std::size_t end = std::min(all, shot_cell_ + room);
+    if (end == shot_cell_ && end < all) return false;
+    piece(cursor_, shot_cell_, end);
+    work_ += 30 + cost_of_cell * static_cast<double>(end - shot_cell_);
+    shot_cell_ = end;
+    if (end < all) return false;
+    ++cursor_, shot_cell_ = 0;
   }
   cursor_ = 0;
   return true;
@@ -192,7 +197,9 @@ bool NetSolver::step_shots() {
   ShotOffsets& shots = *shots_;
   switch (phase_) {
     case Phase::touch:
-      if (each_shot(30, [&](int slot) { shots.touch(slot, *task_.net); })) {
+      if (each_shot(30, [&](int slot, std::size_t first, std::size_t) {
+            if (first == 0) shots.touch(slot, *task_.net);
+          })) {
         shots.start(*task_.net);
         phase_ = Phase::columns;
       }
@@ -206,14 +213,19 @@ bool NetSolver::step_shots() {
       }
       return true;
     case Phase::scatter:
-      if (each_shot(load_cost, [&](int slot) { shots.scatter(slot, *task_.net); })) {
+      if (each_shot(load_cost, [&](int slot, std::size_t first, std::size_t end) {
+            shots.scatter(slot, *task_.net, first, end);
+          })) {
         phase_ = Phase::lower, column_ = 0, cursor_ = shots.first_row(0);
       }
       return true;
     case Phase::lower:
-      if (advance(n, 8 * band, [&](int a, int b) {
-            matrix_.solve_lower_many(shots.columns(), shots.row_length(), 8 * column_, 8, a, b);
-          }, band_panel)) {
+      if (advance(
+              n, 8 * band,
+              [&](int a, int b) {
+                matrix_.solve_lower_many(shots.columns(), shots.row_length(), 8 * column_, 8, a, b);
+              },
+              band_panel)) {
         if (++column_ == shots.groups()) {
           phase_ = Phase::form, column_ = row_ = 0;
         }
@@ -304,8 +316,8 @@ std::expected<bool, Error> NetSolver::step() {
       return false;
     case Phase::factor: {
       bool positive = true;
-      const bool finished =
-          advance(n, 0.5 * band * (band + 8), [&](int a, int b) { positive = matrix_.factor(a, b); }, band_panel);
+      const bool finished = advance(
+          n, 0.5 * band * (band + 8), [&](int a, int b) { positive = matrix_.factor(a, b); }, band_panel);
       if (!positive) return std::unexpected(Error::singular);
       if (!finished) return false;
       result_.smallest_pivot = matrix_.smallest_pivot() / matrix_.largest_pivot();
@@ -330,11 +342,13 @@ std::expected<bool, Error> NetSolver::step() {
       if (!step_shots()) return std::unexpected(Error::singular);
       return false;
     case Phase::backward:
-      if (advance(n, band, [&](int a, int b) { matrix_.solve_upper(right_, n - b, n - a); })) phase_ = Phase::energy;
+      if (advance(n, band, [&](int a, int b) { matrix_.solve_upper(right_, n - b, n - a); }))
+        phase_ = Phase::energy;
       return false;
     case Phase::energy:
       if (fairing_ <= 0 || advance(net.slow_rows(), 100.0 * n / net.slow_rows(), [&](int a, int b) {
-            objective_ -= fairing_ * net.fairing_energy(coefficients(), a, b, task_.length_u_mm, task_.length_v_mm);
+            objective_ -=
+                fairing_ * net.fairing_energy(coefficients(), a, b, task_.length_u_mm, task_.length_v_mm);
           })) {
         phase_ = Phase::sparse_energy;
       }

@@ -34,8 +34,8 @@ struct NetTask {
   const MomentGrid* moments = nullptr;
   PointTotals totals;
   double length_u_mm = 1, length_v_mm = 1;
-  double fairing = 0;               // everywhere
-  double sparse_fairing = 0;        // on top, in cells with fewer points than sparse_points
+  double fairing = 0;         // everywhere
+  double sparse_fairing = 0;  // on top, in cells with fewer points than sparse_points
   std::uint32_t sparse_points = 1;
   double shot_sigma_mm = 0;   // 0: no offsets
   double point_sigma_mm = 0;  // of one point of weight 1; 0: estimated from this net without offsets
@@ -109,7 +109,7 @@ class NetSolver {
   void estimate_noise(double y_squared);
   void take_offsets();
   bool step_shots();
-  // One shot at a time, until the step is full; true when all are done.
+  // The cells of one shot after the other, until the step is full; true when all are done.
   template <typename Piece>
   bool each_shot(double cost_of_cell, Piece&& piece);
   void finish();
@@ -121,6 +121,7 @@ class NetSolver {
   std::vector<double> right_, data_diagonal_, column_sums_;
   Phase phase_ = Phase::done;
   int cursor_ = 0, column_ = 0, row_ = 0;
+  std::size_t shot_cell_ = 0;
   bool norm_wanted_ = false;
   double trace_data_ = 0, fairing_ = 0, sparse_fairing_ = 0, rho_ = 0, objective_ = 0, border_squares_ = 0;
   double work_ = 0, norm_one_ = 0;

@@ -1,15 +1,21 @@
 #include "geometry/fit/plan_map.hpp"
 
+#include "geometry/fit/plan_map_kernel.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <limits>
 
 namespace moldloft::geometry {
 
 namespace {
 
 constexpr double newton_tolerance_mm = 1e-10;
+// In batches a last step follows, which squares what is left: at most its square times the map's second derivatives over the
+// square of its first, 1e-6^2 / 100 mm here, far below the tolerance above.
+constexpr double batch_tolerance_mm = 1e-6;
 constexpr int newton_steps = 25;  // 2-3 are usual; a wild start needs its steps shortened
 constexpr double longest_step =
     0.25;  // of the unit square: keeps a wild start inside the map's neighbourhood
@@ -65,8 +71,10 @@ void PlanMap::assign(const Outline& outline) {
           low_c[i] = control(outline_.sides[low], low_reversed, s + i)[axis];
           high_c[i] = control(outline_.sides[high], high_reversed, s + i)[axis];
         }
-        pairs[s].coefficient[axis] = powers_on_span(knots, s + cubic, low_c);
-        pairs[s].coefficient[2 + axis] = powers_on_span(knots, s + cubic, high_c);
+        const auto low_powers = powers_on_span(knots, s + cubic, low_c);
+        const auto high_powers = powers_on_span(knots, s + cubic, high_c);
+        std::ranges::copy(low_powers, pairs[s].coefficient[axis]);
+        std::ranges::copy(high_powers, pairs[s].coefficient[2 + axis]);
       }
     }
   };
@@ -152,6 +160,68 @@ std::expected<Eigen::Vector2d, Error> PlanMap::invert(const Eigen::Vector2d& xy,
   const double off = std::max({-uv->x(), -uv->y(), uv->x() - 1, uv->y() - 1});
   if (off > margin + 1e-12) return std::unexpected(Error::outside_domain);
   return uv;
+}
+
+// Eight points in one span of either direction, from the map's tangent plane at `guess`. False where that does not hold, or
+// a point lies beyond the sides: then one goes point by point.
+bool PlanMap::invert_eight(const double* x, const double* y, double* u, double* v,
+                           const Eigen::Vector2d& guess, Simd simd) const {
+  const PlanPoint at_guess = at(guess.x(), guess.y());
+  const Eigen::Matrix2d& j = at_guess.jacobian;
+  const double det = j(0, 0) * j(1, 1) - j(0, 1) * j(1, 0), spans = static_cast<double>(along_u_.size());
+  if (!(std::abs(det) > 1e-12)) return false;
+  double low_u = 2, high_u = -1, low_v = 2, high_v = -1;
+  for (int k = 0; k < 8; ++k) {
+    const double dx = x[k] - at_guess.value.x(), dy = y[k] - at_guess.value.y();
+    u[k] = guess.x() + (j(1, 1) * dx - j(0, 1) * dy) / det;
+    v[k] = guess.y() + (j(0, 0) * dy - j(1, 0) * dx) / det;
+    if (!(u[k] >= 0 && u[k] <= 1 && v[k] >= 0 && v[k] <= 1)) return false;
+    low_u = std::min(low_u, u[k]), high_u = std::max(high_u, u[k]);
+    low_v = std::min(low_v, v[k]), high_v = std::max(high_v, v[k]);
+  }
+  const auto span_of = [&](double t) {
+    return std::min(static_cast<int>(t * spans), static_cast<int>(along_u_.size()) - 1);
+  };
+  const int a = span_of(low_u), b = span_of(low_v);
+  if (span_of(high_u) != a || span_of(high_v) != b) return false;
+  const PlanSpan span{
+      .along_u = along_u_[a].coefficient,
+      .along_v = along_v_[b].coefficient,
+      .spans = spans,
+      .first_u = double(a),
+      .first_v = double(b),
+      .corner = {{c00_.x(), c00_.y()}, {c10_.x(), c10_.y()}, {c01_.x(), c01_.y()}, {c11_.x(), c11_.y()}},
+      .tolerance = batch_tolerance_mm,
+      .most_steps = 6};
+  if (!plan_map_kernel(simd).invert_eight(span, x, y, u, v)) return false;
+  for (int k = 0; k < 8; ++k) {
+    if (!(u[k] * spans >= a && u[k] * spans <= a + 1 && v[k] * spans >= b && v[k] * spans <= b + 1))
+      return false;
+  }
+  return true;
+}
+
+std::size_t PlanMap::invert(std::span<const double> x, std::span<const double> y, std::span<double> u,
+                            std::span<double> v, Eigen::Vector2d& guess, double margin, Simd simd) const {
+  std::size_t off = 0;
+  for (std::size_t first = 0; first < x.size(); first += 8) {
+    const std::size_t end = std::min(first + 8, x.size());
+    if (end - first == 8 && invert_eight(&x[first], &y[first], &u[first], &v[first], guess, simd)) {
+      guess = {u[end - 1], v[end - 1]};
+      continue;
+    }
+    for (std::size_t k = first; k < end; ++k) {
+      const auto uv = invert({x[k], y[k]}, guess, margin);
+      if (uv) {
+        guess = *uv;
+      } else {
+        ++off;
+      }
+      u[k] = uv ? uv->x() : std::numeric_limits<double>::quiet_NaN();
+      v[k] = uv ? uv->y() : std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+  return off;
 }
 
 void PlanMap::to_net(BSplineSurface& surface) const {

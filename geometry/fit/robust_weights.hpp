@@ -45,7 +45,8 @@ class AbsoluteMedian {
  private:
   static constexpr int octave_bits = 6, octaves = 60;
   static constexpr std::int64_t size = octaves << octave_bits;
-  static constexpr std::int64_t lowest = (1023ll - 40) << octave_bits;  // 2^-40: beneath it a residual is zero
+  static constexpr std::int64_t lowest = (1023ll - 40)
+                                         << octave_bits;  // 2^-40: beneath it a residual is zero
   static double value(std::int64_t bin) {
     return std::bit_cast<double>(static_cast<std::uint64_t>(bin + lowest) << (52 - octave_bits));
   }

@@ -35,7 +35,8 @@ ShotOffsets::ShotOffsets(int max_shots, int cells_u, int cells_v, std::size_t ma
 }
 
 std::size_t ShotOffsets::bytes() const {
-  return (slot_of_shot_.capacity() + place_of_cell_.capacity() + order_.capacity() + first_row_.capacity()) * 4 +
+  return (slot_of_shot_.capacity() + place_of_cell_.capacity() + order_.capacity() + first_row_.capacity()) *
+             4 +
          slots_.capacity() * sizeof(Slot) + cells_.capacity() * sizeof(ShotCell) +
          (columns_.capacity() + blocks_.capacity() + offsets_.capacity() + right_.capacity() +
           coupled_.capacity() + schur_.size()) *
@@ -52,7 +53,8 @@ void ShotOffsets::clear() {
 
 void ShotOffsets::leave_shot() {
   if (current_slot_ >= 0) {
-    for (std::size_t k = slots_[current_slot_].begin; k < cells_.size(); ++k) place_of_cell_[cells_[k].cell] = -1;
+    for (std::size_t k = slots_[current_slot_].begin; k < cells_.size(); ++k)
+      place_of_cell_[cells_[k].cell] = -1;
   }
   current_slot_ = -1, current_is_exact_ = false;
 }
@@ -101,29 +103,31 @@ void ShotOffsets::add(int shot, const PointBlock& block) {
   }
   slot.end = cells_.size();
   double height = 0;
-  for (int k = 0; k < block.count; ++k) height += block.weighted ? block.weight[k] * block.height[k] : block.height[k];
+  for (int k = 0; k < block.count; ++k)
+    height += block.weighted ? block.weight[k] * block.height[k] : block.height[k];
   slot.height += height;
 }
 
-void ShotOffsets::coarsen(int slot, const MomentGrid& to) {
+void ShotOffsets::coarsen(int slot, const MomentGrid& to, std::size_t first, std::size_t end) {
   const int halves_u = level_u_ / to.cells_u(), halves_v = level_v_ / to.cells_v();
   static const std::array<std::array<std::array<double, 4>, 4>, 3> part{
       restriction<3>(0, 0.5), restriction<3>(0.5, 1), restriction<3>(0, 1)};
   Slot& s = slots_[slot];
-  std::size_t kept = s.begin;
-  for (std::size_t k = s.begin; k < s.end; ++k) {
+  if (first == 0) kept_ = s.begin;
+  for (std::size_t k = s.begin + first; k < s.begin + end; ++k) {
     const ShotCell fine = cells_[k];
     const int i = fine.cell / level_v_, j = fine.cell % level_v_;
     const std::int32_t cell = i / halves_u * to.cells_v() + j / halves_v;
     std::int32_t& place = place_of_cell_[cell];
-    if (place < 0) {  // kept <= k: a merged cell never lies behind those that are still to be read
-      place = static_cast<std::int32_t>(kept);
-      cells_[kept++] = {cell, {}};
+    if (place < 0) {  // kept_ <= k: a merged cell never lies behind those that are still to be read
+      place = static_cast<std::int32_t>(kept_);
+      cells_[kept_++] = {cell, {}};
     }
     add_restricted<3>(part[halves_u == 2 ? i % 2 : 2], part[halves_v == 2 ? j % 2 : 2], fine.moments,
                       cells_[place].moments);
   }
-  s.end = kept;
+  if (s.begin + end < s.end) return;
+  s.end = kept_;
   for (std::size_t k = s.begin; k < s.end; ++k) place_of_cell_[cells_[k].cell] = -1;
 }
 
@@ -132,7 +136,8 @@ void ShotOffsets::touch(int slot, const SplineNet& net) {
   s.first_row = net.unknowns();
   s.weight = 0;
   for (std::size_t k = s.begin; k < s.end; ++k) {
-    s.first_row = std::min(s.first_row, net.first_index(cells_[k].cell / level_v_, cells_[k].cell % level_v_));
+    s.first_row =
+        std::min(s.first_row, net.first_index(cells_[k].cell / level_v_, cells_[k].cell % level_v_));
     for (const double m : cells_[k].moments) s.weight += m;  // the cubics sum to one
   }
 }
@@ -158,9 +163,9 @@ void ShotOffsets::clear_rows(int first, int end) {
             columns_.begin() + static_cast<std::ptrdiff_t>(end) * row_length_, 0.0);
 }
 
-void ShotOffsets::scatter(int slot, const SplineNet& net) {
+void ShotOffsets::scatter(int slot, const SplineNet& net, std::size_t first, std::size_t end) {
   const Slot& s = slots_[slot];
-  for (std::size_t k = s.begin; k < s.end; ++k) {
+  for (std::size_t k = s.begin + first; k < s.begin + end; ++k) {
     const int i = cells_[k].cell / level_v_, j = cells_[k].cell % level_v_;
     net.add_to(columns().subspan(s.column), i, j, net.load(i, j, cells_[k].moments), row_length_);
   }

@@ -36,8 +36,9 @@ class ShotOffsets {
 
   std::size_t cells_of(int slot) const { return slots_[slot].end - slots_[slot].begin; }
 
-  // From one net to the next coarser one: every slot's cells merge, then coarsened() says to which net's.
-  void coarsen(int slot, const MomentGrid& to);
+  // From one net to the next coarser one: the cells of every slot merge, piece by piece in order (`first` and `end` count
+  // the slot's cells, cells_of() before the first piece), then coarsened() says to which net's.
+  void coarsen(int slot, const MomentGrid& to, std::size_t first, std::size_t end);
   void coarsened(const MomentGrid& to) { level_u_ = to.cells_u(), level_v_ = to.cells_v(); }
 
   // For one net: touch() every slot, start(), clear_rows(), scatter() every slot and the right-hand side of y, solve
@@ -49,7 +50,7 @@ class ShotOffsets {
   int first_row(int group) const { return first_row_[group]; }
   std::span<double> columns() { return {columns_.data(), unknowns_ * row_length_}; }
   void clear_rows(int first, int end);
-  void scatter(int slot, const SplineNet&);
+  void scatter(int slot, const SplineNet&, std::size_t first, std::size_t end);
   void set_y(int row, double right) { columns_[static_cast<std::size_t>(row) * row_length_] = right; }
   // Adds the rows [first, end) to the block (a, b) of [y W]'[y W], b <= a, both groups.
   void form(const BandKernel&, int group_a, int group_b, int first, int end);
@@ -88,6 +89,7 @@ class ShotOffsets {
   int row_length_ = 8;
   int exact_ = 0, current_slot_ = -1;
   bool current_is_exact_ = false;
+  std::size_t kept_ = 0;  // of the slot that coarsen() is at
   std::vector<std::int32_t> slot_of_shot_;
   std::vector<std::int32_t> place_of_cell_;  // of the shot at hand
   std::vector<Slot> slots_;

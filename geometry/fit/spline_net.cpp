@@ -158,8 +158,8 @@ double SplineNet::fairing_trace(double length_u, double length_v) const {
   return ss * of_slow[2] * of_fast[0] + 2 * of_slow[1] * of_fast[1] + ff * of_slow[0] * of_fast[2];
 }
 
-void SplineNet::add_fairing(BandCholesky& matrix, int first_row, int end_row, double length_u, double length_v,
-                            double factor) const {
+void SplineNet::add_fairing(BandCholesky& matrix, int first_row, int end_row, double length_u,
+                            double length_v, double factor) const {
   const auto [ss, ff] = fairing_factors(length_u, length_v);
   const auto &s = slow().roughness(), &f = fast().roughness();
   const int step = fast().control();
@@ -221,7 +221,8 @@ void SplineNet::add_to(std::span<double> vector, int cell_u, int cell_v, const C
   for (int k = 0; k < 16; ++k) vector[index(i + k / 4, j + k % 4) * stride] += cell[k];
 }
 
-void SplineNet::add_diagonal_to(std::span<double> vector, int cell_u, int cell_v, const CellMatrix& cell) const {
+void SplineNet::add_diagonal_to(std::span<double> vector, int cell_u, int cell_v,
+                                const CellMatrix& cell) const {
   const int start = first_index(cell_u, cell_v), step = v_is_fast() ? control_v() : control_u();
   for (int a = 0; a < 4; ++a) {
     for (int c = 0; c < 4; ++c) vector[start + a * step + c] += cell[16 * (a * (a + 3) / 2) + 5 * c];

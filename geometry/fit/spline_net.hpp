@@ -26,11 +26,11 @@ class SpanTable {
   explicit SpanTable(std::span<const double> knots);
 
   struct Span {
-    int first;                                      // control point of the first function that lives here
-    double begin, end;                              // of the cell, in the knots' parameter
+    int first;                                        // control point of the first function that lives here
+    double begin, end;                                // of the cell, in the knots' parameter
     std::array<std::array<double, 4>, 4> extraction;  // [a][i]: N_a = sum_i extraction B3_i
-    double pair_rows[10][8];  // [ab][p], a >= b in rows of a: N_a N_b = sum_p B6_p; [7] is zero
-    double pair_columns[8][16];                           // [p][4 d + c]: N_c N_d likewise
+    double pair_rows[10][8];     // [ab][p], a >= b in rows of a: N_a N_b = sum_p B6_p; [7] is zero
+    double pair_columns[8][16];  // [p][4 d + c]: N_c N_d likewise
     std::array<std::array<std::array<double, 4>, 4>, 3> roughness;  // [k][a][b]: integral of N_a^(k) N_b^(k)
   };
   // The same integrals over the whole direction: [k][i][3 + j - i] of N_i^(k) N_j^(k).
@@ -40,7 +40,9 @@ class SpanTable {
   int control() const { return control_; }
   const Span& operator[](int k) const { return table_[k]; }
   const Roughness& roughness() const { return roughness_; }
-  std::size_t bytes() const { return table_.capacity() * sizeof(Span) + 3 * control_ * sizeof(roughness_[0][0]); }
+  std::size_t bytes() const {
+    return table_.capacity() * sizeof(Span) + 3 * control_ * sizeof(roughness_[0][0]);
+  }
 
  private:
   std::vector<Span> table_;
@@ -77,12 +79,14 @@ class SplineNet {
   CellMatrix fairing(int cell_u, int cell_v, double length_u, double length_v) const;
   double fairing_trace(double length_u, double length_v) const;
   int slow_rows() const { return v_is_fast() ? control_u() : control_v(); }
-  void add_fairing(BandCholesky&, int first_row, int end_row, double length_u, double length_v, double factor) const;
+  void add_fairing(BandCholesky&, int first_row, int end_row, double length_u, double length_v,
+                   double factor) const;
   double fairing_energy(std::span<const double> coefficients, int first_row, int end_row, double length_u,
                         double length_v) const;
 
   void add_to(BandCholesky&, int cell_u, int cell_v, const CellMatrix&, double factor) const;
-  void add_to(std::span<double> vector, int cell_u, int cell_v, const CellVector&, std::size_t stride = 1) const;
+  void add_to(std::span<double> vector, int cell_u, int cell_v, const CellVector&,
+              std::size_t stride = 1) const;
   void add_diagonal_to(std::span<double> vector, int cell_u, int cell_v, const CellMatrix&) const;
   static double trace(const CellMatrix&);
   // c' M c for the 16 coefficients that live on a cell.

@@ -88,6 +88,7 @@ struct SurfaceFit::Work {
   Error error = Error::too_few_points;
   std::size_t level = 0, first_level = 0, best = 0;
   int row = 0, shot = 0;
+  std::size_t shot_cell = 0, shot_cells = 0;  // of the shot that merging is at
   double best_score = 0, point_sigma = 0;
   double work = 0;
   PointBlock block;
@@ -145,25 +146,26 @@ std::expected<void, Error> SurfaceFit::add(std::span<const Eigen::Vector3d> worl
   if (!(weight > 0) || !std::isfinite(weight)) return std::unexpected(Error::not_finite);
   PointBlock& block = work.block;
   block.weighted = weight != 1;
-  for (const Eigen::Vector3d& point : world_points) {
-    if (!point.allFinite()) {
-      ++work.report.points_off;
-      continue;
+  std::array<double, PointBlock::capacity> x, y;
+  for (std::size_t first = 0; first < world_points.size(); first += x.size()) {
+    const auto points = world_points.subspan(first, std::min(x.size(), world_points.size() - first));
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      // A height that is not finite sends its point off the plate.
+      x[k] = std::isfinite(points[k].z()) ? points[k].x() : points[k].z(), y[k] = points[k].y();
     }
-    const auto uv = work.map->invert(point.head<2>(), work.last_uv);
-    if (!uv) {
-      ++work.report.points_off;
-      continue;
+    work.report.points_off +=
+        work.map->invert({x.data(), points.size()}, {y.data(), points.size()}, {work.u.data(), points.size()},
+                         {work.v.data(), points.size()}, work.last_uv);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      if (std::isnan(work.u[k])) continue;
+      if (work.totals.points == 0 && block.count == 0) work.datum = points[k].z();
+      const auto to = static_cast<std::size_t>(block.count++);
+      // Rounding may put a point of the rim outside by a hair.
+      work.u[to] = std::clamp(work.u[k], 0.0, 1.0), work.v[to] = std::clamp(work.v[k], 0.0, 1.0);
+      block.height[to] = points[k].z() - work.datum, block.weight[to] = weight;
     }
-    work.last_uv = *uv;
-    if (work.totals.points == 0 && block.count == 0) work.datum = point.z();
-    const int k = block.count++;
-    // Rounding may put a point of the rim outside by a hair.
-    work.u[k] = std::clamp(uv->x(), 0.0, 1.0), work.v[k] = std::clamp(uv->y(), 0.0, 1.0);
-    block.height[k] = point.z() - work.datum, block.weight[k] = weight;
-    if (block.count == PointBlock::capacity) work.fold(shot);
+    work.fold(shot);
   }
-  work.fold(shot);
   return {};
 }
 
@@ -172,7 +174,7 @@ void SurfaceFit::start_solving() {
   work.shots.finish_adding();
   work.take_totals();
   work.report.points_used = work.totals.points;
-  work.level = 0, work.row = work.shot = 0;
+  work.level = 0, work.row = work.shot = 0, work.shot_cell = 0;
   work.best_score = std::numeric_limits<double>::infinity();
   work.point_sigma = work.settings.noise_mm;
   // Nets with more unknowns than the points determine are passed over; their moments are merged all the same.
@@ -226,10 +228,15 @@ bool SurfaceFit::Work::merge_some() {
     work += row_cost;
   }
   while (shot < shots.count()) {
-    const double cost = 30 + restrict_cost * static_cast<double>(shots.cells_of(shot));
-    if (work > 0 && work + cost > NetSolver::work_a_step) return false;
-    shots.coarsen(shot++, grid);
-    work += cost;
+    if (shot_cell == 0) shot_cells = shots.cells_of(shot);
+    const auto room = static_cast<std::size_t>(std::max(0.0, NetSolver::work_a_step - work) / restrict_cost);
+    const std::size_t end = std::min(shot_cells, shot_cell + room);
+    if (end == shot_cell && end < shot_cells) return false;
+    shots.coarsen(shot, grid, shot_cell, end);
+    work += 30 + restrict_cost * static_cast<double>(end - shot_cell);
+    shot_cell = end;
+    if (end < shot_cells) return false;
+    ++shot, shot_cell = 0;
   }
   shots.coarsened(grid);
   row = shot = 0;
@@ -265,6 +272,7 @@ void SurfaceFit::Work::finish() { map->to_net(levels[best].surface); }
 
 std::expected<bool, Error> SurfaceFit::step() {
   Work& work = *work_;
+  work.work = 0;
   switch (work.phase) {
     case Work::Phase::adding:
       return std::unexpected(Error::too_few_points);
@@ -273,7 +281,6 @@ std::expected<bool, Error> SurfaceFit::step() {
     case Work::Phase::done:
       return true;
     case Work::Phase::merge:
-      work.work = 0;
       if (!work.merge_some()) return false;
       if (work.level < work.first_level) {
         ++work.level;
@@ -320,6 +327,7 @@ double SurfaceFit::progress() const {
   return std::min(done / all, 0.999);
 }
 
+double SurfaceFit::work() const { return work_->work; }
 const BSplineSurface& SurfaceFit::surface() const { return work_->levels[work_->best].surface; }
 const SurfaceFitReport& SurfaceFit::report() const { return work_->report; }
 

@@ -37,7 +37,8 @@ void BandCholesky::clear(int first_column, int end_column) {
 
 bool BandCholesky::factor(int first, int end) {
   for (int j = first; j < end; j += band_panel) {
-    if (!kernel_->factor_panel(matrix(), j, std::min(end - j, band_panel), pack_.data(), pivots_)) return false;
+    if (!kernel_->factor_panel(matrix(), j, std::min(end - j, band_panel), pack_.data(), pivots_))
+      return false;
   }
   return true;
 }

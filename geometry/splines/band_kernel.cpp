@@ -29,7 +29,7 @@
 namespace moldloft::geometry {
 
 #define MOLDLOFT_KERNEL(simd, name) \
-  {simd, name::factor_panel, name::solve_lower, name::solve_upper, name::solve_lower_many, name::gram_block}
+  { simd, name::factor_panel, name::solve_lower, name::solve_upper, name::solve_lower_many, name::gram_block }
 
 const BandKernel& band_kernel(Simd simd) {
   assert(machine_has(simd));

@@ -21,16 +21,14 @@ using geometry::FitSettings, geometry::FittedSurface, geometry::PointColumns;
 
 constexpr geometry::FitDomain plate{0, plate_mm, 0, plate_mm};
 
-PointColumns columns(const FitJob& job) {
-  return {.u = job.x, .v = job.y, .z = job.z};
-}
+PointColumns columns(const FitJob& job) { return {.u = job.x, .v = job.y, .z = job.z}; }
 
 FittedSurface fit(const FitJob& job, FitSettings settings) {
   settings.domain = plate;
   auto fitted = geometry::fit_surface(columns(job), settings);
   if (!fitted) {
-    throw std::runtime_error(fmt::format("the fit failed: {} ({})", to_string(fitted.error().error),
-                                         fitted.error().where));
+    throw std::runtime_error(
+        fmt::format("the fit failed: {} ({})", to_string(fitted.error().error), fitted.error().where));
   }
   return *std::move(fitted);
 }
@@ -68,8 +66,8 @@ Json floors(const FitJob& job, const Options& options, const Table& table) {
   const auto ns = [&](auto&& work) { return time_of(runs, work).least / points * 1e9; };
   Json out;
   out["points"] = job.size();
-  const double read = ns(
-      [&] { keep(native::moldloft_read_floor(u.data(), v.data(), job.z.data(), job.size())); });
+  const double read =
+      ns([&] { keep(native::moldloft_read_floor(u.data(), v.data(), job.z.data(), job.size())); });
   const double basis = ns([&] { keep(native::moldloft_basis_floor(u.data(), v.data(), job.size(), 20)); });
   out["read_ns"] = read, out["basis_ns"] = basis;
   table.line("per point, 450,000 points, 20 x 20 cells (least of {} runs)", runs);
@@ -121,9 +119,10 @@ Json nets(const FitJob& job, const Options& options, const Table& table) {
     row["theory_rms_mm"] = theory, row["eigen_apart_mm"] = apart;
     out.push_back(row);
     const std::string fitpack_words = fitpack_s ? fmt::format("{:.3f}", fitpack_s.value_or(0)) : "absent";
-    table.line("  {:>3} x {:<3}{:>8.5f} {:>9.4f} {:>9} {:>7.1f} {:>10.3e} {:>10.3e} {:>10.3e} {:>9} {:>10.1e}", n, n,
-               our.median, eigen.median, fitpack_words,
-               eigen.median / our.median, error.rms, theory, error.max, ours.report.bytes, apart);
+    table.line(
+        "  {:>3} x {:<3}{:>8.5f} {:>9.4f} {:>9} {:>7.1f} {:>10.3e} {:>10.3e} {:>10.3e} {:>9} {:>10.1e}", n, n,
+        our.median, eigen.median, fitpack_words, eigen.median / our.median, error.rms, theory, error.max,
+        ours.report.bytes, apart);
   }
   table.line("  field notes, same job: prototype 0.0029 / 0.0033 / 0.0153 s, Eigen 0.26 / 0.27 / 0.32,");
   table.line("  FITPACK 0.53 / 2.15 / 74.7, GoTools 0.40 / 0.40 / 0.52, PCL on_nurbs 10 / 12 / 14");
@@ -139,11 +138,14 @@ Json automatic(const FitJob& job, const Options& options, double fixed_s, const 
   out["times_fixed"] = taken.median / fixed_s;
   table.line("\nnet chosen by cross-validation among nets of one pass");
   for (const auto& net : chosen.report.nets) {
-    table.line("  {:>2} x {:<2} spans  gcv {:.6e}  bic {:.1f}  sigma {:.6f}{}", net.spans_u, net.spans_v, net.gcv, net.bic,
-               net.sigma, net.spans_u == chosen.report.nets[chosen.report.chosen].spans_u ? "  <- chosen" : "");
+    table.line("  {:>2} x {:<2} spans  gcv {:.6e}  bic {:.1f}  sigma {:.6f}{}", net.spans_u, net.spans_v,
+               net.gcv, net.bic, net.sigma,
+               net.spans_u == chosen.report.nets[chosen.report.chosen].spans_u ? "  <- chosen" : "");
   }
-  table.line("  {} x {} in {:.4f} s = {:.1f} x the fixed 23 x 23 (asked: <= 10), rms {:.3e} mm (asked: <= 7e-4)",
-             chosen.surface.control_u(), chosen.surface.control_v(), taken.median, taken.median / fixed_s, error.rms);
+  table.line(
+      "  {} x {} in {:.4f} s = {:.1f} x the fixed 23 x 23 (asked: <= 10), rms {:.3e} mm (asked: <= 7e-4)",
+      chosen.surface.control_u(), chosen.surface.control_v(), taken.median, taken.median / fixed_s,
+      error.rms);
   table.line("  field notes: FITPACK with s = M 16.9 s, 1.04e-3; GoTools LR 2.7 s, 1.37e-3");
   return out;
 }
@@ -156,13 +158,16 @@ void bad_data(const FitJob& job, Json& out, const Table& table) {
   const FitJob bad = with_outliers(job);
   const FitError plain = error_of(fit(bad, {.control_u = 23, .control_v = 23}).surface);
   FittedSurface robust;
-  const Seconds taken = time_of(3, [&] { robust = fit(bad, {.control_u = 23, .control_v = 23, .robust_passes = 10}); });
+  const Seconds taken =
+      time_of(3, [&] { robust = fit(bad, {.control_u = 23, .control_v = 23, .robust_passes = 10}); });
   const FitError cleaned = error_of(robust.surface);
   out["outlier_rms_mm"] = cleaned.rms, out["outlier_seconds"] = taken.median;
-  table.line("\n80 mm hole: {} empty cells, rms inside {:.4f} mm (asked: <= 0.05; FITPACK 44), outside {:.3e} (whole {:.3e})",
-             hole.report.empty_cells, holed.rms_inside, holed.rms_outside, whole.rms_outside);
-  table.line("1 % outliers of 3 mm: rms {:.3e} -> {:.3e} mm in {} Tukey passes, {:.3f} s (asked: <= 1e-3)", plain.rms,
-             cleaned.rms, robust.report.robust_passes, taken.median);
+  table.line(
+      "\n80 mm hole: {} empty cells, rms inside {:.4f} mm (asked: <= 0.05; FITPACK 44), outside {:.3e} "
+      "(whole {:.3e})",
+      hole.report.empty_cells, holed.rms_inside, holed.rms_outside, whole.rms_outside);
+  table.line("1 % outliers of 3 mm: rms {:.3e} -> {:.3e} mm in {} Tukey passes, {:.3f} s (asked: <= 1e-3)",
+             plain.rms, cleaned.rms, robust.report.robust_passes, taken.median);
 }
 
 void scaling(const FitJob& job, const Options& options, Json& out, const Table& table) {
@@ -182,8 +187,8 @@ void scaling(const FitJob& job, const Options& options, Json& out, const Table& 
     });
     growth.emplace_back(points, taken.least);
     out["scaling"].push_back({{"points", points}, {"seconds", taken.least}, {"peak_rss_mib", peak_mib()}});
-    table.line("  {:>12.0f} points {:>9.5f} s {:>6.2f} ns a point, peak of the process {:.1f} MiB", points, taken.least,
-               taken.least / points * 1e9, peak_mib());
+    table.line("  {:>12.0f} points {:>9.5f} s {:>6.2f} ns a point, peak of the process {:.1f} MiB", points,
+               taken.least, taken.least / points * 1e9, peak_mib());
   }
   out["scaling_exponent"] = exponent(growth);
   table.line("  exponent {:.3f}", exponent(growth));
@@ -192,19 +197,23 @@ void scaling(const FitJob& job, const Options& options, Json& out, const Table& 
   growth.clear();
   out["control_scaling"] = Json::array();
   for (const int n : options.quick ? std::vector{8, 23} : std::vector{8, 16, 23, 32, 64, 128}) {
-    const Seconds taken = time_of(n > 64 ? 3 : 9, [&] { keep(fit(job, {.control_u = n, .control_v = n}).report.sigma); });
+    const Seconds taken =
+        time_of(n > 64 ? 3 : 9, [&] { keep(fit(job, {.control_u = n, .control_v = n}).report.sigma); });
     growth.emplace_back(n * n, taken.least);
     out["control_scaling"].push_back({{"n", n}, {"seconds", taken.least}});
     table.line("  {:>3} x {:<3} {:>9.5f} s", n, n, taken.least);
   }
   out["control_scaling_exponent"] = exponent(growth);
-  table.line("  exponent {:.3f} in the number of control points (the pass over the points is part of it)", exponent(growth));
+  table.line("  exponent {:.3f} in the number of control points (the pass over the points is part of it)",
+             exponent(growth));
 }
 
 Json two_threads(const FitJob& job, const Options& options, const Table& table) {
   const std::size_t half = job.size() / 2;
   const auto part = [&](std::size_t from, std::size_t count) -> PointColumns {
-    return {.u = {job.x.data() + from, count}, .v = {job.y.data() + from, count}, .z = {job.z.data() + from, count}};
+    return {.u = {job.x.data() + from, count},
+            .v = {job.y.data() + from, count},
+            .z = {job.z.data() + from, count}};
   };
   const int runs = options.quick ? 3 : 15;
   const auto add_all = [&] {
@@ -221,8 +230,8 @@ Json two_threads(const FitJob& job, const Options& options, const Table& table) 
     keep(first.totals().squares);
   };
   const Seconds one = time_of(runs, add_all), two = time_of(runs, add_halves);
-  table.line("\naccumulation on one thread {:.2f} ms, on two with an accumulator each, merged, {:.2f} ms", one.least * 1e3,
-             two.least * 1e3);
+  table.line("\naccumulation on one thread {:.2f} ms, on two with an accumulator each, merged, {:.2f} ms",
+             one.least * 1e3, two.least * 1e3);
   return {{"one_thread_s", one.least}, {"two_threads_s", two.least}};
 }
 
@@ -232,7 +241,8 @@ Json run_fit(const Options& options) {
   const Table table{options.quiet};
   const FitJob job = fit_job();
   Json out = floors(job, options, table);
-  scaling(job, options, out, table);  // first, while the process is small: its peak is what shows that memory is flat
+  scaling(job, options, out,
+          table);  // first, while the process is small: its peak is what shows that memory is flat
   out["nets"] = nets(job, options, table);
   out["auto"] = automatic(job, options, out["nets"][1]["ours_s"].get<double>(), table);
   bad_data(job, out, table);

@@ -56,7 +56,8 @@ double true_height(double x, double y) {
   const double u = x / plate_mm - 0.5, v = y / plate_mm - 0.5;
   // A saddle with a bend, and the waviness that line heating leaves.
   return 60 * u * v + 30 * u * u - 24 * v * v + 1.6 * std::sin(8.2 * u + 5.1 * v + 0.4) +
-         0.9 * std::cos(9.5 * v - 6.3 * u) + 0.25 * std::exp(-60 * ((u - 0.1) * (u - 0.1) + (v + 0.15) * (v + 0.15)));
+         0.9 * std::cos(9.5 * v - 6.3 * u) +
+         0.25 * std::exp(-60 * ((u - 0.1) * (u - 0.1) + (v + 0.15) * (v + 0.15)));
 }
 
 FitJob fit_job(std::uint64_t seed) {

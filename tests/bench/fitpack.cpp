@@ -29,7 +29,8 @@ print(time.perf_counter() - start)
 }  // namespace
 
 Fitpack::Fitpack(const FitJob& job)
-    : folder_(std::filesystem::temp_directory_path() / fmt::format("moldloft-bench-{:x}", std::random_device{}())) {
+    : folder_(std::filesystem::temp_directory_path() /
+              fmt::format("moldloft-bench-{:x}", std::random_device{}())) {
   std::filesystem::create_directories(folder_);
   std::ofstream points(folder_ / "points.f64", std::ios::binary);
   for (const auto* column : {&job.x, &job.y, &job.z}) {

@@ -69,9 +69,11 @@ double moldloft_basis_floor(const double* u, const double* v, std::size_t points
     const Eight left1 = x - k, right1 = k + 1.0 - x, left2 = x - inside(k - 1.0), left3 = x - inside(k - 2.0);
     const Eight right2 = inside(k + 2.0) - x, right3 = inside(k + 3.0) - x;
     const Eight a1 = 1.0 / (right1 + left2), a2 = 1.0 / (right2 + left1);
-    const Eight q0 = right1 * right1 * a1, q1 = left2 * right1 * a1 + right2 * left1 * a2, q2 = left1 * left1 * a2;
+    const Eight q0 = right1 * right1 * a1, q1 = left2 * right1 * a1 + right2 * left1 * a2,
+                q2 = left1 * left1 * a2;
     const Eight b1 = q0 / (right1 + left3), b2 = q1 / (right2 + left2), b3 = q2 / (right3 + left1);
-    out[0] = right1 * b1, out[1] = left3 * b1 + right2 * b2, out[2] = left2 * b2 + right3 * b3, out[3] = left1 * b3;
+    out[0] = right1 * b1, out[1] = left3 * b1 + right2 * b2, out[2] = left2 * b2 + right3 * b3,
+    out[3] = left1 * b3;
   };
   for (std::size_t i = 0; i + 8 <= points; i += 8) {
     EightInt span_u, span_v;
@@ -90,8 +92,8 @@ double moldloft_basis_floor(const double* u, const double* v, std::size_t points
   return all;
 }
 
-bool moldloft_plain_eigen_fit(const double* u, const double* v, const double* z, std::size_t points, int control,
-                              double* control_points) {
+bool moldloft_plain_eigen_fit(const double* u, const double* v, const double* z, std::size_t points,
+                              int control, double* control_points) {
   using Matrix = Eigen::SparseMatrix<double, Eigen::RowMajor, int>;
   const int spans = control - 3;
   Matrix a(static_cast<Eigen::Index>(points), control * control);

@@ -94,6 +94,44 @@ TEST_CASE("the net is the map, exactly, over any knots that refine the sides'") 
   }
 }
 
+TEST_CASE(
+    "a batch of neighbours has the parameters of its points one by one, and the same bits on every vector "
+    "unit") {
+  const PlanMap map(bent_outline());
+  std::vector<double> x, y;
+  // Stripes across the plate and beyond its sides, across the sides' spans, and one point that is none.
+  for (int i = 0; i < 5003; ++i) {
+    const double t = std::fmod(i * 0.00071, 1.04) - 0.02, s = std::fmod(i * 0.0123 + 0.3, 1.0);
+    const Vector2d p = map.at(t, s).value;
+    x.push_back(p.x()), y.push_back(p.y());
+  }
+  x[1001] = NAN, y[2002] = INFINITY;
+  std::vector<double> first;
+  for (const auto simd : {geometry::Simd::portable, geometry::Simd::avx2, geometry::Simd::avx512}) {
+    if (!geometry::machine_has(simd)) continue;
+    std::vector<double> u(x.size()), v(x.size());
+    Vector2d guess(0.5, 0.5), one_guess(0.5, 0.5);
+    const std::size_t off = map.invert(x, y, u, v, guess, 0.0, simd);
+    std::size_t off_alone = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      const auto alone = map.invert({x[i], y[i]}, one_guess);
+      off_alone += !alone;
+      REQUIRE(std::isnan(u[i]) == !alone.has_value());
+      if (!alone) continue;
+      one_guess = *alone;
+      CHECK(std::abs(u[i] - alone->x()) < 1e-12);
+      CHECK(std::abs(v[i] - alone->y()) < 1e-12);
+      CHECK((map.at(u[i], v[i]).value - Vector2d(x[i], y[i])).norm() < 1e-10);
+    }
+    CHECK(off == off_alone);
+    CHECK(off > 100);
+    u.insert(u.end(), v.begin(), v.end());
+    std::erase_if(u, [](double value) { return std::isnan(value); });
+    if (first.empty()) first = u;
+    CHECK(first == u);
+  }
+}
+
 TEST_CASE("inverting a point beside the last takes a fraction of a microsecond and no memory") {
   const PlanMap map(bent_outline());
   std::vector<Vector2d> points;

@@ -337,7 +337,7 @@ TEST_CASE("when shots outgrow the memory plan they are taken as exact, and count
   CHECK(deviation(surface_fit.surface(), flat).max < 0.03);
 }
 
-TEST_CASE("adding and solving take no memory and no long piece") {
+TEST_CASE("adding and solving take no memory, and no step more than the stated work") {
   const PlanMap map(test::straight_outline(square));
   const Height wave = [](double x, double y) { return 5 * std::sin(x / 30) * std::cos(y / 40); };
   const std::vector<Shot> shots = sweep(wave, 4, 305, 1, 0.051, 0.013);
@@ -358,7 +358,7 @@ TEST_CASE("adding and solving take no memory and no long piece") {
   }
   surface_fit.start_solving();
   bool ready = false;
-  double progress = 0;
+  double progress = 0, most_work = 0, all_work = 0;
   bool rising = true;
   while (!ready) {
     const auto start = Clock::now();
@@ -366,6 +366,7 @@ TEST_CASE("adding and solving take no memory and no long piece") {
     const double took = us(Clock::now() - start);
     longest = std::max(longest, took), solving += took, long_pieces += took > 200;
     ++pieces;
+    most_work = std::max(most_work, surface_fit.work()), all_work += surface_fit.work();
     rising = rising && surface_fit.progress() >= progress - 1e-12;
     progress = surface_fit.progress();
   }
@@ -373,6 +374,10 @@ TEST_CASE("adding and solving take no memory and no long piece") {
   CHECK(after == before);
   CHECK(progress == 1);
   CHECK(rising);
+  CHECK(most_work <= SurfaceFit::work_a_step);
+  // What the factors of the five nets alone take must be in the count.
+  CHECK(all_work > 0.5 * 35 * 35 * 108 * 108);
+  MESSAGE("" << all_work / 1e6 << " million multiply-adds, at most " << most_work << " a step");
   MESSAGE("a chunk of 512 points " << adding / chunks << " us; " << pieces << " pieces, " << solving / 1000
                                    << " ms in all, longest " << longest << " us, " << long_pieces
                                    << " over 200 us");
