@@ -66,7 +66,8 @@ MomentAccumulator::MomentAccumulator(const SplineNet& net, double datum, Simd si
               net.spans_v()[net.cells_v() - 1].end},
       datum_(datum),
       kernel_(&moment_kernel(simd)),
-      lookup_(std::make_shared<const std::pair<CellLookup, CellLookup>>(net.spans_u(), net.spans_v())) {}
+      lookup_(std::make_shared<const std::pair<KnotCells, KnotCells>>(net.spans_u().cells(),
+                                                                      net.spans_v().cells())) {}
 
 std::size_t MomentAccumulator::bytes() const {
   return grid_.bytes() + (lookup_ ? lookup_->first.bytes() + lookup_->second.bytes() : 0);
@@ -137,7 +138,9 @@ std::expected<void, FitFailure> MomentAccumulator::read(const PointColumns& colu
   } else {
     check();
     for (int k = 0; k < block.count; ++k) {
-      const int i = lookup_->first.find(u[k], block.s[k]), j = lookup_->second.find(v[k], block.t[k]);
+      const auto& [along_u, along_v] = *lookup_;
+      const int i = along_u.locate(u[k]), j = along_v.locate(v[k]);
+      block.s[k] = along_u.local(i, u[k]), block.t[k] = along_v.local(j, v[k]);
       block.cell[k] = i * grid_.cells_v() + j;
     }
   }

@@ -20,10 +20,10 @@
 #include <span>
 
 #include "geometry/error.hpp"
-#include "geometry/fit/cell_lookup.hpp"
 #include "geometry/fit/cell_moments.hpp"
 #include "geometry/fit/net_solver.hpp"
 #include "geometry/fit/point_columns.hpp"
+#include "geometry/splines/knot_cells.hpp"
 
 namespace moldloft::geometry {
 
@@ -71,7 +71,7 @@ class MomentAccumulator {
   FitDomain domain_;
   double datum_;
   const MomentKernel* kernel_;
-  std::shared_ptr<const std::pair<CellLookup, CellLookup>> lookup_;  // null: equal cells
+  std::shared_ptr<const std::pair<KnotCells, KnotCells>> lookup_;  // null: equal cells
 };
 
 }  // namespace moldloft::geometry

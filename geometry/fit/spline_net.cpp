@@ -66,7 +66,8 @@ void fill_roughness(SpanTable::Span& span, std::span<const double> knots) {
 
 }  // namespace
 
-SpanTable::SpanTable(std::span<const double> knots) : control_(static_cast<int>(knots.size()) - cubic - 1) {
+SpanTable::SpanTable(std::span<const double> knots)
+    : cells_(knots), control_(static_cast<int>(knots.size()) - cubic - 1) {
   assert(control_ >= 4);
   table_.reserve(control_ - cubic);
   for (int k = cubic; k < control_; ++k) {

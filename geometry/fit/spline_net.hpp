@@ -17,6 +17,7 @@
 
 #include "geometry/fit/moment_kernel.hpp"
 #include "geometry/splines/band_cholesky.hpp"
+#include "geometry/splines/knot_cells.hpp"
 
 namespace moldloft::geometry {
 
@@ -37,14 +38,16 @@ class SpanTable {
   using Roughness = std::array<std::vector<std::array<double, 7>>, 3>;
 
   int spans() const { return static_cast<int>(table_.size()); }
+  const KnotCells& cells() const { return cells_; }
   int control() const { return control_; }
   const Span& operator[](int k) const { return table_[k]; }
   const Roughness& roughness() const { return roughness_; }
   std::size_t bytes() const {
-    return table_.capacity() * sizeof(Span) + 3 * control_ * sizeof(roughness_[0][0]);
+    return table_.capacity() * sizeof(Span) + cells_.bytes() + 3 * control_ * sizeof(roughness_[0][0]);
   }
 
  private:
+  KnotCells cells_;
   std::vector<Span> table_;
   Roughness roughness_;
   int control_;

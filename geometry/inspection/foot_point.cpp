@@ -222,7 +222,7 @@ FootPoint foot_of(const Place& place, const Lanes& p, const Rectangle& domain) {
 }
 
 Rectangle domain_of(const PreparedSurface& surface) {
-  const SpanTable &in_u = surface.along_u(), &in_v = surface.along_v();
+  const KnotCells &in_u = surface.along_u(), &in_v = surface.along_v();
   return {in_u.first(), in_u.last(), in_v.first(), in_v.last()};
 }
 
@@ -293,7 +293,7 @@ class Search {
   }
 
   void solve_span(int i, int j) {
-    const SpanTable &in_u = surface_.along_u(), &in_v = surface_.along_v();
+    const KnotCells &in_u = surface_.along_u(), &in_v = surface_.along_v();
     const Rectangle r{in_u.begin_of(i), in_u.end_of(i), in_v.begin_of(j), in_v.end_of(j)};
     const SpanPolynomial& span = surface_.span(i, j);
     const Box& box = surface_.box(0, i, j);

@@ -64,23 +64,6 @@ double Box::squared_distance(const Vector3d& p) const {
   return sum;
 }
 
-SpanTable::SpanTable(std::span<const double> knots) {
-  const std::size_t end = knots.size() - cubic;
-  for (std::size_t k = cubic; k < end; ++k) {
-    if (breaks_.empty() || knots[k] > breaks_.back()) breaks_.push_back(knots[k]);
-  }
-  const int buckets = 2 * count();
-  per_unit_ = buckets / (last() - first());
-  start_.resize(static_cast<std::size_t>(buckets) + 1);  // one more for the very end
-  int span = 0;
-  for (int bucket = 0; bucket <= buckets; ++bucket) {
-    // A hair less, so that rounding in locate() can only make the walk start too early.
-    const double begin = first() + (bucket - 1e-9) / per_unit_;
-    while (begin >= end_of(span) && span + 1 < count()) ++span;
-    start_[static_cast<std::size_t>(bucket)] = span;
-  }
-}
-
 Box box_of(const BezierNet& net) {
   Box box{net[0][0], net[0][0]};
   for (const auto& row : net) {
@@ -134,7 +117,7 @@ SpanBounds bounds_of(const BezierNet& net, double width_u, double width_v) {
 }
 
 std::expected<PreparedSurface, Error> PreparedSurface::from(const BSplineSurface& surface) {
-  const auto& [knots_u, knots_v, x, y, z] = surface;
+  const auto& [knots_u, knots_v, x, y, z, degree_u, degree_v] = surface;
   if (y.rows() != x.rows() || z.rows() != x.rows() || y.cols() != x.cols() || z.cols() != x.cols())
     return std::unexpected(Error::too_few_points);
   if (const auto ok = check(knots_u, x.rows()); !ok) return std::unexpected(ok.error());
@@ -149,8 +132,8 @@ std::expected<PreparedSurface, Error> PreparedSurface::from(const BSplineSurface
 }
 
 void PreparedSurface::build_spans(const BSplineSurface& surface) {
-  along_u_ = SpanTable(surface.knots_u);
-  along_v_ = SpanTable(surface.knots_v);
+  along_u_ = KnotCells(surface.knots_u);
+  along_v_ = KnotCells(surface.knots_v);
   const std::vector<SpanBasis> all_u = span_bases(surface.knots_u), all_v = span_bases(surface.knots_v);
   spans_.reserve(all_u.size() * all_v.size());
   const auto control = [&](int i, int j) {
@@ -178,7 +161,7 @@ void PreparedSurface::build_spans(const BSplineSurface& surface) {
 
 void PreparedSurface::bezier_net(int i, int j, BezierNet& net) const {
   // The blossom of s^k at three arguments -w or w is their elementary symmetric mean.
-  const auto blossoms = [](const SpanTable& table, int span, double middle, double(&rows)[4][4]) {
+  const auto blossoms = [](const KnotCells& table, int span, double middle, double(&rows)[4][4]) {
     const double w = std::max(table.end_of(span) - middle, middle - table.begin_of(span));
     const double values[4][4] = {{1, -w, w * w, -w * w * w},
                                  {1, -w / 3, -w * w / 3, w * w * w},

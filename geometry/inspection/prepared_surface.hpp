@@ -22,6 +22,7 @@
 #include "geometry/error.hpp"
 #include "geometry/inspection/span_polynomial.hpp"
 #include "geometry/splines/bspline.hpp"
+#include "geometry/splines/knot_cells.hpp"
 
 namespace moldloft::geometry {
 
@@ -32,29 +33,6 @@ struct Box {
 
 struct Parameters {
   double u = 0, v = 0;
-};
-
-// The distinct knots of one direction, and which span a parameter lies in without a search.
-class SpanTable {
- public:
-  SpanTable() = default;
-  explicit SpanTable(std::span<const double> knots);
-
-  int count() const { return static_cast<int>(breaks_.size()) - 1; }
-  double first() const { return breaks_.front(); }
-  double last() const { return breaks_.back(); }
-  double begin_of(int span) const { return breaks_[static_cast<std::size_t>(span)]; }
-  double end_of(int span) const { return breaks_[static_cast<std::size_t>(span) + 1]; }
-  int locate(double t) const {  // t within the domain
-    int span = start_[static_cast<std::size_t>((t - first()) * per_unit_)];
-    while (t >= end_of(span) && span + 1 < count()) ++span;
-    return span;
-  }
-
- private:
-  std::vector<double> breaks_;
-  std::vector<int> start_;  // of each of equal buckets: the span that holds its begin
-  double per_unit_ = 0;
 };
 
 // What a search must know of a span beyond its box: bounds on the derivatives, from their control points.
@@ -89,8 +67,8 @@ class PreparedSurface {
   // middle of the span whose box is nearest in a descent through the boxes.
   Parameters guess_of(const Eigen::Vector3d& p) const;
 
-  const SpanTable& along_u() const { return along_u_; }
-  const SpanTable& along_v() const { return along_v_; }
+  const KnotCells& along_u() const { return along_u_; }
+  const KnotCells& along_v() const { return along_v_; }
   const SpanPolynomial& span(int i, int j) const { return spans_[index(i, j)]; }
   const SpanPolynomial& span_at(double u, double v) const {
     return span(along_u_.locate(u), along_v_.locate(v));
@@ -124,7 +102,7 @@ class PreparedSurface {
   Parameters plan_guess(double x, double y) const;
   Parameters descended_guess(const Eigen::Vector3d& p) const;
 
-  SpanTable along_u_, along_v_;
+  KnotCells along_u_, along_v_;
   std::vector<SpanPolynomial> spans_;
   std::vector<SpanBounds> bounds_;
   std::vector<Box> boxes_;

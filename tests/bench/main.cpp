@@ -11,6 +11,7 @@
 namespace moldloft::bench {
 
 // Each in a file of its own, bench/NAME.cpp.
+Json run_curvature(const Options&);
 Json run_edges(const Options&);
 Json run_fit(const Options&);
 Json run_localize(const Options&);
@@ -22,6 +23,7 @@ std::span<const Benchmark> all_benchmarks() {
       {"fit", "surface fit: floors, nets, choice of the net, bad data, growth", run_fit},
       {"project", "foot points with a guess and from nowhere", run_project},
       {"localize", "poses of measured points, and their deviations", run_localize},
+      {"curvature", "curvature maps, contours, and the fit whose parameters are not known", run_curvature},
       {"edges", "the plate's edge in one shot", run_edges},
       {"thesis", "chapter 6 of the thesis again: wave, hood, fuselage, plate, tables 6.1 to 6.3", run_thesis},
   };

@@ -141,17 +141,16 @@ TEST_CASE("cells of uneven knots are found as by search") {
   REQUIRE(check_knots(knots).has_value());
   const SpanTable table(knots);
   CHECK(table.spans() == 6);
-  const CellLookup lookup(table);
+  const KnotCells& cells = table.cells();
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(0, 1);
   for (int i = 0; i < 20'000; ++i) {
     const double t = i < 8    ? table[i % 6].begin
                      : i < 20 ? table[i % 6].end
                               : unit(random) * (i % 3 == 0 ? 0.004 : 1);
-    double local = -1;
-    const int cell = lookup.find(t, local);
+    const int cell = cells.locate(t);
     CHECK(table[cell].first + 3 == find_span(knots, t));
-    CHECK(local == doctest::Approx((t - table[cell].begin) / (table[cell].end - table[cell].begin)));
+    CHECK(cells.local(cell, t) == doctest::Approx((t - table[cell].begin) / (table[cell].end - table[cell].begin)));
   }
 }
 

@@ -44,24 +44,10 @@ TEST_CASE("parameters outside the domain are those of its border") {
   CHECK(prepared->at(0.2, 7).value == prepared->at(0.2, 1).value);
 }
 
-TEST_CASE("a span is located as a walk over the knots would find it") {
-  const std::vector<double> knots{-2, -2, -2, -2, -1.5, 0.1, 0.1, 0.1, 0.1000001, 3, 7, 7, 7, 7};
-  const SpanTable table(knots);
-  const std::vector<double> breaks{-2, -1.5, 0.1, 0.1000001, 3, 7};
-  REQUIRE(table.count() == 5);
-  std::vector<double> places = breaks;
-  for (double t = -2; t <= 7; t += 0.0037) places.push_back(t);
-  for (const double t : places) {
-    int expected = 0;
-    while (expected + 1 < 5 && t >= breaks[static_cast<std::size_t>(expected) + 1]) ++expected;
-    CHECK(table.locate(t) == expected);
-  }
-}
-
 TEST_CASE("boxes contain their spans, and boxes above contain those below") {
   const BSplineSurface surface = wild_surface(3);
   const auto prepared = PreparedSurface::from(surface);
-  const SpanTable &in_u = prepared->along_u(), &in_v = prepared->along_v();
+  const KnotCells &in_u = prepared->along_u(), &in_v = prepared->along_v();
   for (double u = 0; u <= 1; u += 0.01) {
     for (double v = 0; v <= 1; v += 0.01) {
       const Vector3d p = surface.at(u, v).value;
@@ -75,7 +61,7 @@ TEST_CASE("boxes contain their spans, and boxes above contain those below") {
 
 TEST_CASE("bounds of a span hold at every place of it") {
   const auto prepared = PreparedSurface::from(wild_surface(4));
-  const SpanTable &in_u = prepared->along_u(), &in_v = prepared->along_v();
+  const KnotCells &in_u = prepared->along_u(), &in_v = prepared->along_v();
   const double rounding = 1 + 1e-12;
   for (double u = 0; u <= 1; u += 0.013) {
     for (double v = 0; v <= 1; v += 0.013) {
