@@ -207,6 +207,15 @@ TEST_CASE("lines of a STEP file break between parameters at 80 columns, unless a
   }
 }
 
+TEST_CASE("a long text with commas stays whole: a line's end inside a string would be lost") {
+  CadLabel wordy = label;
+  wordy.description.clear();
+  for (int i = 0; i < 40; ++i) wordy.description += "one, two, ";
+  const std::string text = step_text({.surface = test::bent_plate()}, wordy).value();
+  CHECK(text.find("FILE_DESCRIPTION(('" + wordy.description + "'),") != text.npos);
+  CHECK(text.find("\n'" + wordy.description + "',\n") != text.npos);  // of the product
+}
+
 TEST_CASE("the same face and label give the same bytes, and text from outside cannot end a statement") {
   CadLabel odd = label;
   odd.name = "Plate 'A\\B');#1=X(';";
