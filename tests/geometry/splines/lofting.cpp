@@ -195,6 +195,8 @@ TEST_CASE("what is wrong with curves to be lofted is named, and which of them") 
   CHECK(is(loft(wrong), Error::not_finite, 2));
   wrong = curves, wrong[3] = wrong[2];
   CHECK(is(loft(wrong), Error::coincident_curves, 3));
+  CHECK(is(loft_parameters(wrong), Error::coincident_curves, 3));
+  CHECK(is(loft_parameters(std::span{curves}.first(1)), Error::too_few_points, 1));
   const std::vector<double> crowded{0, 0.01, 0.02, 0.03, 0.04, 1};
   CHECK(is(loft(curves, crowded, uniform_clamped_knots(3)), Error::span_without_points, 4));
   CHECK(is(loft(curves, std::vector{0.0, 0.2, 0.4, 0.6, 0.8, 1.2}, uniform_clamped_knots(2)),

@@ -106,6 +106,13 @@ TEST_CASE("the nearest pairs are joined first, and what is too far away stays al
   REQUIRE(loose.has_value());
   REQUIRE(loose->lines.size() == 3);
   for (int s = 0; s < 3; ++s) CHECK(loose->lines[s].joints[0].next == s);
+  // The other way round, and numbered from the other side: the first pair that is near enough is not the
+  // nearest.
+  std::vector<StripesOfShot> turned{shot(0, 100, 3), shot(101, 200, 3, -9)};
+  std::ranges::reverse(turned[1]);
+  const auto nearest = join_stripes(turned, {.most_gap_mm = 12});
+  REQUIRE(nearest->lines.size() == 3);
+  for (int s = 0; s < 3; ++s) CHECK(nearest->lines[s].joints[0].next == 2 - s);
 
   // One stripe fewer in the second shot: the line without a partner does not run through.
   auto fewer = shots;
