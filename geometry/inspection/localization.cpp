@@ -20,7 +20,11 @@ constexpr double sigma_from_mad = 1.4826;  // of normal noise
 constexpr double weak_ratio = 5;
 constexpr double penetration_mm = 1e-9;
 constexpr double least_damping = 1e-6, first_damping = 1e-3, more_damping = 30, most_damping = 1e12;
-constexpr double coarse_mm = 1e-3;  // enough to tell which points stand beyond the border
+// Steps below these are taken without asking for a lower sum: rounding hides it, or points beyond the border
+// do.
+constexpr double unseen_mm = 1e-3, trusted_mm = 1;
+constexpr double coarse_mm = 0.1;  // enough to tell which points stand beyond the border
+constexpr int most_rounds = 8;     // of leaving such points out
 
 // Fixed unknowns stay in the equations, uncoupled and stiffer than all the others together: their steps are
 // zero, and their eigenvalues come last.
@@ -122,10 +126,13 @@ class Alignment {
     const auto& spread = system_.moments().spread;
     if (!(spread[1] > flat_spread * spread[2])) return failed(Error::collinear);
     if (free_.count > 0) {
-      if (!settle(coarse_mm)) return failed(Error::not_converged);
-      const bool coarse = sums_.beyond_border > 0;
-      beyond_ = system_.leave_out_beyond(settings_.border_tolerance_mm);
-      if (coarse && !settle(settings_.settled_mm)) return failed(Error::not_converged);
+      // As the pose gets better other points turn out to stand beyond the border, and some of those not to.
+      for (int round = 0; round < most_rounds; ++round) {
+        if (!settle(coarse_mm)) return failed(Error::not_converged);
+        if (!system_.leave_out_beyond(settings_.border_tolerance_mm)) break;
+      }
+      beyond_ = static_cast<std::size_t>(std::ranges::count(system_.taking_part(), 0));
+      if (sums_.beyond_border > 0 && !settle(settings_.settled_mm)) return failed(Error::not_converged);
       if (settings_.robust && !settle_robustly()) return failed(Error::not_converged);
     }
     if (settings_.side != AllowedSide::both) {
@@ -167,8 +174,8 @@ class Alignment {
   }
 
   // The tangent planes that continue the design beyond its border turn when feet move along the border, which
-  // the equations leave out. While such points take part, steps below coarse_mm are therefore not asked for a
-  // lower sum, and it is enough to settle within `beyond_mm`.
+  // the equations leave out. While such points take part, the sum need not fall at every step, and it is
+  // enough to settle within `beyond_mm`.
   bool settle(double beyond_mm) {
     double damping = 0;
     sums_ = pass();
@@ -181,7 +188,7 @@ class Alignment {
       if (length < (sums_.beyond_border > 0 ? beyond_mm : settings_.settled_mm))
         return true;  // what is left is far below; no need to look again
       const PointPlaneSums next = pass();
-      if (next.square <= sums_.square || length < coarse_mm) {
+      if (next.square <= sums_.square || length < (sums_.beyond_border > 0 ? trusted_mm : unseen_mm)) {
         sums_ = next;
         damping = damping > least_damping ? 0.1 * damping : 0;
       } else {

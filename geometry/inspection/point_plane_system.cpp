@@ -97,12 +97,14 @@ PointPlaneSums PointPlaneSystem::pass(const RigidMotion& design_from_plate, doub
   return sums;
 }
 
-std::size_t PointPlaneSystem::leave_out_beyond(double overhang_mm) {
-  std::size_t out = 0;
+bool PointPlaneSystem::leave_out_beyond(double overhang_mm) {
+  bool changed = false;
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (takes_part_[i] && overhangs_[i] > overhang_mm) takes_part_[i] = 0, ++out;
+    const std::uint8_t inside = overhangs_[i] <= overhang_mm ? 1 : 0;
+    changed |= inside != takes_part_[i];
+    takes_part_[i] = inside;
   }
-  return out;
+  return changed;
 }
 
 std::size_t PointPlaneSystem::leave_out_farther(double distance_mm) {

@@ -56,9 +56,10 @@ class PointPlaneSystem {
   std::span<const std::array<double, 6>> rows() const { return rows_; }  // j; only after keep_rows()
   void keep_rows() { rows_.resize(points_.size()); }
 
-  // Leaves points out of all passes that follow: those which stand farther beyond the border than this after
-  // the last pass; those at which the last robust weight was zero. Return how many.
-  std::size_t leave_out_beyond(double overhang_mm);
+  // Chooses who takes part in the passes that follow, by the last one. Beyond: all but the points that stand
+  // farther beyond the border than this; says whether that changes anything. Farther: without those at which
+  // a robust weight of this width is zero; says how many.
+  bool leave_out_beyond(double overhang_mm);
   std::size_t leave_out_farther(double distance_mm);
   std::span<const std::uint8_t> taking_part() const { return takes_part_; }
 
