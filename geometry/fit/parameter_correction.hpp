@@ -7,12 +7,12 @@
 //              stands on the tangent plane counts, since the point's parameters will follow; that is
 //              Gauss-Newton with the parameters eliminated, and at the domain's border, where a parameter
 //              cannot follow, the residual counts in that direction too. Then every point's parameters go to
-//              its foot by Newton steps that never lengthen its distance. Trust region: the step is damped by
-//              lambda sum |surface's movement at the points|^2 (Levenberg-Marquardt in the metric of the
-//              data). It is kept only if the sum of squared distances falls; if not, lambda grows and the
-//              step is taken again. So no round, and no result, is worse than the fit at the given
-//              parameters. Point-distance steps (PDM: refit at the corrected parameters) are there for
-//              comparison: they crawl.
+//              its foot by Newton steps that never lengthen its distance. Point-distance steps (PDM: refit
+//              at the corrected parameters) are there for comparison: they crawl.
+// Trust        the step is damped by lambda sum |surface's movement at the points|^2 (Levenberg-Marquardt in
+//              the metric of the data). It is kept only if the sum of squared distances falls; if not, lambda
+//              grows and the step is taken again. So no round, and no result, is worse than the fit at the
+//              given parameters.
 // Units        mm; parameters in the knots' domain, [0, 1]^2 as a rule
 // Accuracy     points of a surface over the same knots, from parameters off by a tenth of a span: back to
 //              1e-9 of their extent where the border is kept, to 1e-6 in a hundred rounds where it is free
@@ -23,7 +23,7 @@
 // Cost         a round: a point about 1.5 us, the solution 3 half_band^2 a control point with half_band = 3
 //              (3 n + 4), n the shorter side of the net. 1,296 points on 11 x 11: 2.5 ms a round; 10 to 40
 //              rounds
-// Allocation   everything, at the start; not for the control thread
+// Allocation   the equations at the start, a copy of net and feet a round; not for the control thread
 // Failure      Error::too_few_points (fewer than free control points, or points without parameters),
 //              not_finite, outside_domain (a parameter off the knots), collinear (parameters that span no
 //              area), knots_not_increasing (not clamped, not increasing, an interior knot of multiplicity

@@ -14,7 +14,7 @@
 //              exactly; so |f - level| <= 8 eps max |f'|, and the field's own rounding.
 //              isoparametric_line: chords within the tolerance asked for, since a cubic's second derivative
 //              is linear
-// Cost         trace 4 ns a node and 30 ns a vertex; refine about 12 evaluations of the field a vertex
+// Cost         trace about 5 ns a node; refine about 12 evaluations of the field a vertex
 // Allocation   what is returned, and one index an edge of the grid
 // Failure      Error::too_few_points (less than 2 x 2 nodes, or values that do not fill the grid), not_finite
 //              (level, coordinates, infinite values, light), knots_not_increasing (coordinates), collinear (a
