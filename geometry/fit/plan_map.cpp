@@ -16,6 +16,8 @@ constexpr double newton_tolerance_mm = 1e-10;
 // In batches a last step follows, which squares what is left: at most its square times the map's second derivatives over the
 // square of its first, 1e-6^2 / 100 mm here, far below the tolerance above.
 constexpr double batch_tolerance_mm = 1e-6;
+// Batches take points as far off the plate as this, in its own lengths.
+constexpr double near_plate = 0.5;
 constexpr int newton_steps = 25;  // 2-3 are usual; a wild start needs its steps shortened
 constexpr double longest_step =
     0.25;  // of the unit square: keeps a wild start inside the map's neighbourhood
@@ -162,28 +164,28 @@ std::expected<Eigen::Vector2d, Error> PlanMap::invert(const Eigen::Vector2d& xy,
   return uv;
 }
 
-// Eight points in one span of either direction, from the map's tangent plane at `guess`. False where that does not hold, or
-// a point lies beyond the sides: then one goes point by point.
+// Eight points in one span of either direction (or beyond its end, if it is the last), from the map's tangent plane at
+// `guess`. False where that does not hold: then one goes point by point.
 bool PlanMap::invert_eight(const double* x, const double* y, double* u, double* v,
                            const Eigen::Vector2d& guess, Simd simd) const {
   const PlanPoint at_guess = at(guess.x(), guess.y());
   const Eigen::Matrix2d& j = at_guess.jacobian;
   const double det = j(0, 0) * j(1, 1) - j(0, 1) * j(1, 0), spans = static_cast<double>(along_u_.size());
   if (!(std::abs(det) > 1e-12)) return false;
-  double low_u = 2, high_u = -1, low_v = 2, high_v = -1;
+  const auto span_of = [&](double t) {
+    return std::clamp(static_cast<int>(t * spans), 0, static_cast<int>(along_u_.size()) - 1);
+  };
+  const auto near = [](double t) { return t > -near_plate && t < 1 + near_plate; };
+  int a = -1, b = -1;
   for (int k = 0; k < 8; ++k) {
     const double dx = x[k] - at_guess.value.x(), dy = y[k] - at_guess.value.y();
     u[k] = guess.x() + (j(1, 1) * dx - j(0, 1) * dy) / det;
     v[k] = guess.y() + (j(0, 0) * dy - j(1, 0) * dx) / det;
-    if (!(u[k] >= 0 && u[k] <= 1 && v[k] >= 0 && v[k] <= 1)) return false;
-    low_u = std::min(low_u, u[k]), high_u = std::max(high_u, u[k]);
-    low_v = std::min(low_v, v[k]), high_v = std::max(high_v, v[k]);
+    if (!near(u[k]) || !near(v[k])) return false;
+    const int span_u = span_of(u[k]), span_v = span_of(v[k]);
+    if (k == 0) a = span_u, b = span_v;
+    if (span_u != a || span_v != b) return false;
   }
-  const auto span_of = [&](double t) {
-    return std::min(static_cast<int>(t * spans), static_cast<int>(along_u_.size()) - 1);
-  };
-  const int a = span_of(low_u), b = span_of(low_v);
-  if (span_of(high_u) != a || span_of(high_v) != b) return false;
   const PlanSpan span{
       .along_u = along_u_[a].coefficient,
       .along_v = along_v_[b].coefficient,
@@ -195,8 +197,8 @@ bool PlanMap::invert_eight(const double* x, const double* y, double* u, double* 
       .most_steps = 6};
   if (!plan_map_kernel(simd).invert_eight(span, x, y, u, v)) return false;
   for (int k = 0; k < 8; ++k) {
-    if (!(u[k] * spans >= a && u[k] * spans <= a + 1 && v[k] * spans >= b && v[k] * spans <= b + 1))
-      return false;
+    const double s = std::clamp(u[k], 0.0, 1.0) * spans, t = std::clamp(v[k], 0.0, 1.0) * spans;
+    if (!(s >= a && s <= a + 1 && t >= b && t <= b + 1 && near(u[k]) && near(v[k]))) return false;
   }
   return true;
 }
@@ -208,6 +210,11 @@ std::size_t PlanMap::invert(std::span<const double> x, std::span<const double> y
     const std::size_t end = std::min(first + 8, x.size());
     if (end - first == 8 && invert_eight(&x[first], &y[first], &u[first], &v[first], guess, simd)) {
       guess = {u[end - 1], v[end - 1]};
+      for (std::size_t k = first; k < end; ++k) {
+        if (std::max({-u[k], -v[k], u[k] - 1, v[k] - 1}) <= margin + 1e-12) continue;
+        ++off;
+        u[k] = v[k] = std::numeric_limits<double>::quiet_NaN();
+      }
       continue;
     }
     for (std::size_t k = first; k < end; ++k) {
