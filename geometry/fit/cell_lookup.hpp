@@ -1,5 +1,5 @@
-// Which cell of a knot vector a parameter lies in, for knots that are not equally spaced: a table of equal buckets leads to
-// the first cell that may hold it.
+// Which cell of a knot vector a parameter lies in, for knots that are not equally spaced: a table of equal
+// buckets leads to the first cell that may hold it.
 //
 // Cost         2-3 ns; buckets are as fine as the finest cell, up to 4,096
 // Allocation   in the constructor only
