@@ -184,6 +184,13 @@ TEST_CASE("a hole is filled smoothly, and the surface outside does not feel it")
   // 64 in the middle, that over sqrt(5) rms; the rim is a cell wide, and q at most (7^2 + 5^2)^2 times 5.
   CHECK(rms_error(fitted->surface, in_hole) < 74 * 74 * 5 * std::pow(0.13 + 0.05, 4) / 64 / std::sqrt(5.0));
   CHECK(rms_error(fitted->surface, far) < 1.05 * rms_error(whole->surface, far));
+  // The residual is that of the points, without the fairing's energy.
+  double squares = 0;
+  for (std::size_t i = 0; i < holed.u.size(); ++i) {
+    squares += std::pow(holed.z[i] - fitted->surface.at(holed.u[i], holed.v[i]).value.z(), 2);
+  }
+  const double points_held = static_cast<double>(holed.u.size());
+  CHECK(fitted->report.rms_residual == doctest::Approx(std::sqrt(squares / points_held)).epsilon(1e-9));
   // Without fairing it is an error that names a cell without points.
   const auto refused =
       fit_surface(holed.columns(), {.control_u = 23, .control_v = 23, .fairing = no_fairing});
