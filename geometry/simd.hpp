@@ -1,12 +1,14 @@
-// Which vector instructions a kernel may use: one binary carries every variant, and the machine picks at run time.
+// Which vector instructions a kernel may use: one binary carries every variant, and the machine picks at
+// run time.
 //
 // A kernel is written once, in a .inc file, on the compiler's vector extension, and included once a variant:
 //     MOLDLOFT_SIMD_LANES   doubles in a vector: 2, 4, 8
 //     MOLDLOFT_SIMD_TARGET  the attribute that every function of the file carries
 //     MOLDLOFT_SIMD_NAME    the namespace it lands in
-// The rule that makes all variants give the same bits: no fused multiply-add (the build's -ffp-contract=off), and every
-// number is the result of the same operations in the same order whatever the width. Sums go over points in order, lanes
-// over entries; a sum over lanes is kept in eight partial sums that are added up in one fixed order.
+// The rule that makes all variants give the same bits: no fused multiply-add (the build's
+// -ffp-contract=off), and every number is the result of the same operations in the same order whatever the
+// width. Sums go over points in order, lanes over entries; a sum over lanes is kept in eight partial sums
+// that are added up in one fixed order.
 #pragma once
 
 #include <array>

@@ -1,9 +1,10 @@
-// What the surface fit keeps of its points: per cell of a net 7 x 7 sums of B6 B6 and 4 x 4 sums of z B3 B3. They
-// are all that least squares with bicubic splines over these cells needs (field notes, "Bernstein moments"), and the
-// moments of a coarser net follow from them exactly. A row of the 7 x 7 carries an eighth sum, w z^2 B6_p, so that
-// the squares of the heights are known cell by cell too.
+// What the surface fit keeps of its points: per cell of a net 7 x 7 sums of B6 B6 and 4 x 4 sums of z B3
+// B3. They are all that least squares with bicubic splines over these cells needs (field notes, "Bernstein
+// moments"), and the moments of a coarser net follow from them exactly. A row of the 7 x 7 carries an
+// eighth sum, w z^2 B6_p, so that the squares of the heights are known cell by cell too.
 //
-// Cost         add: 56 + 16 multiply-adds (the plain form; moment_kernel.hpp has the fast one); merge: moment_kernel.hpp
+// Cost         add: 56 + 16 multiply-adds (the plain form; moment_kernel.hpp has the fast one); merge:
+//              moment_kernel.hpp
 // Allocation   in the constructor only
 #pragma once
 
@@ -64,8 +65,8 @@ class MomentGrid {
 
   // Fills row i of this grid from `fine`, whose cells are halves of this grid's cells in u, in v, or in both.
   void merge_row(int i, const MomentGrid& fine);
-  // Fills this grid from `fine`, cell (i, j) from the fine cells [at_u[i], at_u[i + 1]) x [at_v[j], at_v[j + 1]).
-  // Allocates for the restriction matrices.
+  // Fills this grid from `fine`, cell (i, j) from the fine cells [at_u[i], at_u[i + 1]) x [at_v[j], at_v[j
+  // + 1]). Allocates for the restriction matrices.
   void merge_blocks(const MomentGrid& fine, std::span<const int> at_u, std::span<const int> at_v);
   // Another grid's sums, same cells. What is taken away must have been added before.
   void add(const MomentGrid& other);

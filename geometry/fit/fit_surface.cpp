@@ -203,8 +203,8 @@ class Fitter {
     }
   }
 
-  // Between the best net and its neighbours, of half and twice its spans, lie others whose knots are knots of the finest
-  // grid too, only not quite evenly spaced; their moments follow from the same sums.
+  // Between the best net and its neighbours, of half and twice its spans, lie others whose knots are knots
+  // of the finest grid too, only not quite evenly spaced; their moments follow from the same sums.
   std::expected<void, FitFailure> try_between() {
     const FitDomain& d = settings_.domain;
     const int u = candidates_[chosen_].net.cells_u(), v = candidates_[chosen_].net.cells_v();

@@ -1,18 +1,22 @@
-// One call from points to a surface: z(u, v) as a bicubic B-spline, least squares on a given net or on one chosen from a
-// tolerance, with fairing where data are missing, robust against outliers, the boundary given or free.
+// One call from points to a surface: z(u, v) as a bicubic B-spline, least squares on a given net or on one
+// chosen from a tolerance, with fairing where data are missing, robust against outliers, the boundary given
+// or free.
 //
 //     auto fitted = fit_surface({.u = x, .v = y, .z = z}, {.domain = {0, 305, 0, 305}, .tolerance = 0.005});
 //
-// Points are folded into moments (moment_accumulator.hpp), so a serial and a parallel or streamed use differ only in who
-// adds: fill accumulators wherever the points are, merge them, and call fit_moments().
+// Points are folded into moments (moment_accumulator.hpp), so a serial and a parallel or streamed use
+// differ only in who adds: fill accumulators wherever the points are, merge them, and call fit_moments().
 //
-// Model        the unique minimum of sum w (z - f(u, v))^2 + fairing; x and y of the surface are u and v themselves
-// Net          control_u x control_v over equal spans; or knots_u, knots_v; or, with control_u == 0, chosen by
-//              cross-validation from one pass over the points: nested nets of finest_spans x finest_spans down to 4 x 4,
-//              then nets between the best of them and its neighbours, whose knots are some of the finest net's (where
-//              the points are at hand, one more pass spaces them evenly)
-// Accuracy     coefficients within 1e-11 of the heights' range of a dense QR solution; rms error against the truth
-//              sigma sqrt(N / M) for N control points and M points, where the net can follow the truth
+// Model        the unique minimum of sum w (z - f(u, v))^2 + fairing; x and y of the surface are u and v
+//              themselves
+// Net          control_u x control_v over equal spans; or knots_u, knots_v; or, with control_u == 0, chosen
+//              by cross-validation from one pass over the points: nested nets of finest_spans x
+//              finest_spans down to 4 x 4, then nets between the best of them and its neighbours, whose
+//              knots are some of the finest net's (where the points are at hand, one more pass spaces them
+//              evenly)
+// Accuracy     coefficients within 1e-11 of the heights' range of a dense QR solution; rms error against
+//              the truth sigma sqrt(N / M) for N control points and M points, where the net can follow the
+//              truth
 // Cost         450,000 points on 23 x 23: 3 ms (AVX-512); the choice among five nets 10 ms
 // Memory       independent of the number of points: <= 1 MiB on 23 x 23, 10 MiB on 64 x 64
 // Failure      FitFailure names the error and the point, cell, coefficient or knot that it is about
@@ -29,8 +33,8 @@
 namespace moldloft::geometry {
 
 struct FairingSettings {
-  // Weights of the thin-plate energy relative to the data (ratio of the matrices' traces): everywhere, and on top of it
-  // in cells with fewer than sparse_points points. Zero both: cells without points are an error.
+  // Weights of the thin-plate energy relative to the data (ratio of the matrices' traces): everywhere, and
+  // on top of it in cells with fewer than sparse_points points. Zero both: cells without points are an error.
   double everywhere = 0;
   double where_sparse = 1e-5;
   std::uint32_t sparse_points = 16;
@@ -79,8 +83,8 @@ struct FittedSurface {
 
 std::expected<FittedSurface, FitFailure> fit_surface(const PointColumns&, const FitSettings&);
 
-// The same from moments that were added up before; robust and residual passes, which need the points, are left out. The
-// accumulator's cells must be those of the net (accumulator_for makes such a one).
+// The same from moments that were added up before; robust and residual passes, which need the points, are
+// left out. The accumulator's cells must be those of the net (accumulator_for makes such a one).
 std::expected<FittedSurface, FitFailure> fit_moments(const MomentAccumulator&, const FitSettings&);
 std::expected<MomentAccumulator, FitFailure> accumulator_for(const FitSettings&, double datum = 0);
 

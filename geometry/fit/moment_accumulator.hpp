@@ -1,16 +1,18 @@
-// Points added up, as a value: what a least-squares fit over these cells will ever need of them, in memory that does not
-// depend on their number.
+// Points added up, as a value: what a least-squares fit over these cells will ever need of them, in memory
+// that does not depend on their number.
 //
-// Additive     points may come in any pieces, from shots, threads or machines: add() appends, merge() adds another's sums.
-//              add() gives the same bits however the points are cut into calls; merge() in a fixed order is deterministic
-// Removable    subtract() takes another's sums away: what was added with it is forgotten up to rounding, eps times the
-//              sums that the cell held with it (a cell that keeps 1 point of n is good to n eps). A cell that has lost
-//              all its points is exactly empty
+// Additive     points may come in any pieces, from shots, threads or machines: add() appends, merge() adds
+//              another's sums. add() gives the same bits however the points are cut into calls; merge() in
+//              a fixed order is deterministic
+// Removable    subtract() takes another's sums away: what was added with it is forgotten up to rounding,
+//              eps times the sums that the cell held with it (a cell that keeps 1 point of n is good to n
+//              eps). A cell that has lost all its points is exactly empty
 // Weighted     a weight counts as so many points; zero is allowed, negative is an error
 // Memory       580 bytes a cell: 0.23 MB for 20 x 20
-// Cost         5 ns a point (AVX-512), 8 ns (AVX2), 25 ns (SSE2) on scanner stripes; knots that are not equally spaced
-//              5 ns more
-// Failure      not_finite, outside_domain, negative_weight: with the first point that is; the points before it are in
+// Cost         5 ns a point (AVX-512), 8 ns (AVX2), 25 ns (SSE2) on scanner stripes; knots that are not
+//              equally spaced 5 ns more
+// Failure      not_finite, outside_domain, negative_weight: with the first point that is; the points before
+//              it are in
 // Threads      one accumulator a thread
 #pragma once
 
@@ -27,7 +29,8 @@
 
 namespace moldloft::geometry {
 
-// What is wrong with data, and where: the number of the point, knot, cell or coefficient that the error speaks of.
+// What is wrong with data, and where: the number of the point, knot, cell or coefficient that the error
+// speaks of.
 struct FitFailure {
   Error error{};
   std::size_t where = 0;
@@ -39,7 +42,8 @@ struct FitDomain {  // of the columns u and v
   bool operator==(const FitDomain&) const = default;
 };
 
-// Knots that a cubic net can live on: finite, not decreasing, the ends four times, interior ones at most three times over.
+// Knots that a cubic net can live on: finite, not decreasing, the ends four times, interior ones at most
+// three times over.
 std::expected<void, FitFailure> check_knots(std::span<const double> knots);
 
 class MomentAccumulator {
@@ -60,8 +64,8 @@ class MomentAccumulator {
   PointTotals totals() const;  // added up over the cells, in order
   std::size_t bytes() const;
 
-  // add() in two halves, for a pass that looks at residuals and weighs the points in between. A block's cells and
-  // Bernstein values, cut short at a point that is refused:
+  // add() in two halves, for a pass that looks at residuals and weighs the points in between. A block's
+  // cells and Bernstein values, cut short at a point that is refused:
   std::expected<void, FitFailure> read(const PointColumns&, std::size_t first, PointBlock&) const;
   // and such a block added with the weights that it has now.
   void fold(PointBlock&);

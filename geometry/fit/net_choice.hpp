@@ -1,9 +1,9 @@
 // Which of several nets over the same points: by what it is expected to miss on points not seen.
 //
-// Source       generalized cross-validation (Craven and Wahba 1979), with the degrees of freedom inflated against
-//              undersmoothing (Kim and Gu 2004); BIC (Schwarz 1978)
-// Tolerance    GCV is a mean squared error of prediction, so the difference of two scores is the square of what the
-//              coarser net misses: the coarsest net within tolerance^2 of the best is taken
+// Source       generalized cross-validation (Craven and Wahba 1979), with the degrees of freedom inflated
+//              against undersmoothing (Kim and Gu 2004); BIC (Schwarz 1978)
+// Tolerance    GCV is a mean squared error of prediction, so the difference of two scores is the square of
+//              what the coarser net misses: the coarsest net within tolerance^2 of the best is taken
 #pragma once
 
 #include <cmath>
@@ -22,8 +22,8 @@ struct NetScore {
   int empty_cells = 0;
 };
 
-// What the poses of shots leave behind, beside their offsets, is not independent from point to point, and plain
-// cross-validation would spend control points on it.
+// What the poses of shots leave behind, beside their offsets, is not independent from point to point, and
+// plain cross-validation would spend control points on it.
 constexpr double dof_inflation = 1.4;
 
 inline double generalized_cross_validation(const PointTotals& totals, const NetResult& result,

@@ -93,8 +93,8 @@ bool NetSolver::on_border(int unknown) const {
   return i == 0 || j == 0 || i == slow - 1 || j == fast - 1;
 }
 
-// The ring is taken out of the equations in place, so that the band keeps its shape: its rows and columns become those of
-// a diagonal matrix whose solution is the value given.
+// The ring is taken out of the equations in place, so that the band keeps its shape: its rows and columns
+// become those of a diagonal matrix whose solution is the value given.
 void NetSolver::add_border() {
   const int n = size(), band = matrix_.half_band();
   const double typical = trace_data_ / n;
@@ -164,7 +164,8 @@ void NetSolver::take_offsets() {
   result_.freedom += n;
 }
 
-// The minimum of the objective holds the energy of fairing and border; the residual is what is left without them.
+// The minimum of the objective holds the energy of fairing and border; the residual is what is left without
+// them.
 void NetSolver::finish() {
   if (!task_.boundary.empty() && std::isfinite(task_.boundary_weight)) {
     for (int k = 0; k < size(); ++k) {

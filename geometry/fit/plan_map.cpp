@@ -13,8 +13,8 @@ namespace moldloft::geometry {
 namespace {
 
 constexpr double newton_tolerance_mm = 1e-10;
-// In batches a last step follows, which squares what is left: at most its square times the map's second derivatives over the
-// square of its first, 1e-6^2 / 100 mm here, far below the tolerance above.
+// In batches a last step follows, which squares what is left: at most its square times the map's second
+// derivatives over the square of its first, 1e-6^2 / 100 mm here, far below the tolerance above.
 constexpr double batch_tolerance_mm = 1e-6;
 // Batches take points as far off the plate as this, in its own lengths.
 constexpr double near_plate = 0.5;
@@ -164,8 +164,8 @@ std::expected<Eigen::Vector2d, Error> PlanMap::invert(const Eigen::Vector2d& xy,
   return uv;
 }
 
-// Eight points in one span of either direction (or beyond its end, if it is the last), from the map's tangent plane at
-// `guess`. False where that does not hold: then one goes point by point.
+// Eight points in one span of either direction (or beyond its end, if it is the last), from the map's
+// tangent plane at `guess`. False where that does not hold: then one goes point by point.
 bool PlanMap::invert_eight(const double* x, const double* y, double* u, double* v,
                            const Eigen::Vector2d& guess, Simd simd) const {
   const PlanPoint at_guess = at(guess.x(), guess.y());

@@ -7,8 +7,8 @@
 // u runs along sides[0] (corner 0 to corner 1), v along sides[3] reversed (corner 0 to corner 3).
 //
 // Accuracy     the inverse satisfies |X(u, v) - (x, y)| <= 1e-10 mm
-// Cost         a point with a neighbour's (u, v) as guess: 2-3 Newton steps, about 0.1 us; in batches of neighbours
-//              10-20 ns a point
+// Cost         a point with a neighbour's (u, v) as guess: 2-3 Newton steps, about 0.1 us; in batches of
+//              neighbours 10-20 ns a point
 // Allocation   none in invert(); the constructor copies four curves
 // Failure      from check() Error::folded_map, collinear (a corner whose sides do not turn) or not_finite;
 //              outside_domain from invert() when the point lies off the plate by more than the margin asked
@@ -44,9 +44,9 @@ class PlanMap {
   std::expected<Eigen::Vector2d, Error> invert(const Eigen::Vector2d& xy, const Eigen::Vector2d& guess,
                                                double margin = 0.0) const;
 
-  // The same for a batch of neighbours, such as a stripe: u[k], v[k] for every x[k], y[k], eight at a time. A point that
-  // has none gets NaN. `guess` is that of the first point and is left at the last one's. Bits do not depend on the
-  // machine's vector unit. Returns how many points have none.
+  // The same for a batch of neighbours, such as a stripe: u[k], v[k] for every x[k], y[k], eight at a time.
+  // A point that has none gets NaN. `guess` is that of the first point and is left at the last one's. Bits
+  // do not depend on the machine's vector unit. Returns how many points have none.
   std::size_t invert(std::span<const double> x, std::span<const double> y, std::span<double> u,
                      std::span<double> v, Eigen::Vector2d& guess, double margin = 0.0,
                      Simd = widest_simd()) const;

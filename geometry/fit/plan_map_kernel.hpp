@@ -1,5 +1,5 @@
-// The inner loop of the plan map's inverse: Newton's method on eight points at once that lie in one span of the sides in
-// either direction, as the points of a stripe nearly always do.
+// The inner loop of the plan map's inverse: Newton's method on eight points at once that lie in one span of
+// the sides in either direction, as the points of a stripe nearly always do.
 //
 // Accuracy     all eight take one more step after the last has come within the tolerance
 // Cost         10 ns a point and step with SSE2, 3 with AVX-512

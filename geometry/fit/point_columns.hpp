@@ -1,5 +1,5 @@
-// The caller's points as they lie in memory: columns of double or float, dense or strided. Nothing is copied; a block at a
-// time is read.
+// The caller's points as they lie in memory: columns of double or float, dense or strided. Nothing is
+// copied; a block at a time is read.
 #pragma once
 
 #include <cassert>

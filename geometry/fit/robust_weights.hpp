@@ -1,4 +1,5 @@
-// Tukey's biweight for streamed points: weights from residuals, and their scale from a histogram, so that no residual is kept.
+// Tukey's biweight for streamed points: weights from residuals, and their scale from a histogram, so that
+// no residual is kept.
 //
 // Source       Beaton and Tukey 1974; scale = 1.4826 median |r| (Huber 1981)
 // Accuracy     the median to 1 % (64 bins an octave, straight line within a bin)

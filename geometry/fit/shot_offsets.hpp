@@ -1,15 +1,17 @@
 // The unknown height errors of the shots, fitted together with the surface.
 //
-// With d_s the offset of shot s, prior weight rho = (sigma / sigma_shot)^2, and L the band factor of the surface's
-// normal equations, the bordered system is eliminated on the shots:
+// With d_s the offset of shot s, prior weight rho = (sigma / sigma_shot)^2, and L the band factor of the
+// surface's normal equations, the bordered system is eliminated on the shots:
 //     S d = h - W' y,   S = D + rho I - W' W,   W = L^-1 B,   y = L^-1 r
-// where column s of B holds the sums of the basis functions over the points of shot s (the right-hand side for z = 1),
-// D the number of points and h the sum of heights of every shot. The surface follows from L' c = y - W d.
+// where column s of B holds the sums of the basis functions over the points of shot s (the right-hand side
+// for z = 1), D the number of points and h the sum of heights of every shot. The surface follows from L' c
+// = y - W d.
 //
-// Columns      y and W side by side, row by row, in groups of eight columns; sorted by the first unknown that a shot
-//              touches, above which a column is zero, so that a group starts where its first shot does
-// Memory       a shot's moments are kept only for the cells that it touches; when the plan is full, the shot at
-//              hand and those after it are taken as exact and counted
+// Columns      y and W side by side, row by row, in groups of eight columns; sorted by the first unknown
+//              that a shot touches, above which a column is zero, so that a group starts where its first
+//              shot does
+// Memory       a shot's moments are kept only for the cells that it touches; when the plan is full, the
+//              shot at hand and those after it are taken as exact and counted
 // Allocation   in the constructor only
 #pragma once
 
@@ -36,13 +38,14 @@ class ShotOffsets {
 
   std::size_t cells_of(int slot) const { return slots_[slot].end - slots_[slot].begin; }
 
-  // From one net to the next coarser one: the cells of every slot merge, piece by piece in order (`first` and `end` count
-  // the slot's cells, cells_of() before the first piece), then coarsened() says to which net's.
+  // From one net to the next coarser one: the cells of every slot merge, piece by piece in order (`first`
+  // and `end` count the slot's cells, cells_of() before the first piece), then coarsened() says to which
+  // net's.
   void coarsen(int slot, const MomentGrid& to, std::size_t first, std::size_t end);
   void coarsened(const MomentGrid& to) { level_u_ = to.cells_u(), level_v_ = to.cells_v(); }
 
-  // For one net: touch() every slot, start(), clear_rows(), scatter() every slot and the right-hand side of y, solve
-  // all groups by the caller's band solve, form() all blocks, then factor and solve.
+  // For one net: touch() every slot, start(), clear_rows(), scatter() every slot and the right-hand side of
+  // y, solve all groups by the caller's band solve, form() all blocks, then factor and solve.
   void touch(int slot, const SplineNet&);
   void start(const SplineNet&);
   int row_length() const { return row_length_; }

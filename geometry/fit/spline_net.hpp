@@ -1,8 +1,8 @@
 // A net of bicubic B-splines seen cell by cell: how Bernstein moments become normal equations.
 //
-// On a cell (a knot span by a knot span) 4 x 4 basis functions live. Each is a bicubic in Bernstein form (Bezier
-// extraction), so a product of two is a bisextic, and every entry of the cell's 16 x 16 Gram matrix is a fixed
-// combination of its 7 x 7 moments. All coefficients are nonnegative: nothing cancels.
+// On a cell (a knot span by a knot span) 4 x 4 basis functions live. Each is a bicubic in Bernstein form
+// (Bezier extraction), so a product of two is a bisextic, and every entry of the cell's 16 x 16 Gram matrix
+// is a fixed combination of its 7 x 7 moments. All coefficients are nonnegative: nothing cancels.
 //
 // Knots        clamped, cubic, any spacing; interior knots up to three times over
 // Accuracy     a Gram matrix agrees with the sum over the points to 1e-13 relative
@@ -53,8 +53,8 @@ class SpanTable {
   int control_;
 };
 
-// Half of a cell's symmetric 16 x 16 matrix: [16 ab + 4 d + c] couples function (a, c) with (b, d), a >= b, where a and
-// b count along the net's slow direction and c and d along its fast one.
+// Half of a cell's symmetric 16 x 16 matrix: [16 ab + 4 d + c] couples function (a, c) with (b, d), a >= b,
+// where a and b count along the net's slow direction and c and d along its fast one.
 using CellMatrix = std::array<double, 160>;
 using CellVector = std::array<double, 16>;  // functions 4 a + c, a along u, c along v
 
@@ -76,9 +76,10 @@ class SplineNet {
 
   CellMatrix gram(int cell_u, int cell_v, const CellMoments&) const;
   CellVector load(int cell_u, int cell_v, std::span<const double, 16> moments) const;
-  // The thin-plate energy z_xx^2 + 2 z_xy^2 + z_yy^2 as a quadratic form, for a plate of the given lengths (mm), up to
-  // a factor that drops out of its ratio to the data: of one cell, and of the whole net, where it is a sum of three
-  // products of one-dimensional integrals and costs 84 multiply-adds an unknown. Rows are those of the slow direction.
+  // The thin-plate energy z_xx^2 + 2 z_xy^2 + z_yy^2 as a quadratic form, for a plate of the given lengths
+  // (mm), up to a factor that drops out of its ratio to the data: of one cell, and of the whole net, where
+  // it is a sum of three products of one-dimensional integrals and costs 84 multiply-adds an unknown. Rows
+  // are those of the slow direction.
   CellMatrix fairing(int cell_u, int cell_v, double length_u, double length_v) const;
   double fairing_trace(double length_u, double length_v) const;
   int slow_rows() const { return v_is_fast() ? control_u() : control_v(); }

@@ -1,10 +1,11 @@
 // Cholesky factorization of a symmetric positive definite band matrix, and its triangular solves, in slices
-// of columns: the work of a control tick is bounded, the numbers are those of one go, bit for bit, on any vector unit.
+// of columns: the work of a control tick is bounded, the numbers are those of one go, bit for bit, on any
+// vector unit.
 //
 // Storage      the lower band, column by column: entry(i, j) for j <= i <= j + half_band
 // Accuracy     that of Cholesky without pivoting: |L L' - A| <= (half_band + 2) eps |L| |L'| entry by entry
-// Cost         half_band^2 / 2 multiply-adds a column to factor, 2 half_band a column and right-hand side to solve;
-//              4,096 columns of half band 201 in 3 ms, 529 of 72 in 0.1 ms (AVX-512)
+// Cost         half_band^2 / 2 multiply-adds a column to factor, 2 half_band a column and right-hand side
+//              to solve; 4,096 columns of half band 201 in 3 ms, 529 of 72 in 0.1 ms (AVX-512)
 // Allocation   in the constructor only; reset() takes any smaller size
 // Failure      factor() returns false at a pivot that is not positive, and failed_column() says where
 #pragma once
@@ -42,8 +43,8 @@ class BandCholesky {
   void solve_lower(std::span<double> x, int first, int end) const;
   void solve_upper(std::span<double> x, int first, int end) const;
 
-  // The same slice of L Y = B for many right-hand sides, row by row: x[row * row_length + side], for the sides
-  // [first_side, first_side + sides), both multiples of 8.
+  // The same slice of L Y = B for many right-hand sides, row by row: x[row * row_length + side], for the
+  // sides [first_side, first_side + sides), both multiples of 8.
   void solve_lower_many(std::span<double> x, int row_length, int first_side, int sides, int first,
                         int end) const;
 

@@ -1,5 +1,5 @@
-// An estimate of |A^-1| in the 1-norm from A's band factor: a few solves, never too large, and within a factor of three
-// in practice.
+// An estimate of |A^-1| in the 1-norm from A's band factor: a few solves, never too large, and within a
+// factor of three in practice.
 //
 // Source       Hager 1984, Higham 1988 (LAPACK's xLACON without its last safeguard)
 // Cost         at most ten solves

@@ -1,5 +1,5 @@
-// FITPACK (Dierckx 1993) through python3 and scipy, if the machine has them: a child process reads the columns from a
-// file and takes the time of its own call.
+// FITPACK (Dierckx 1993) through python3 and scipy, if the machine has them: a child process reads the
+// columns from a file and takes the time of its own call.
 #pragma once
 
 #include <filesystem>
@@ -16,7 +16,8 @@ class Fitpack {
   Fitpack(const Fitpack&) = delete;
   Fitpack& operator=(const Fitpack&) = delete;
 
-  // Seconds of scipy.interpolate.LSQBivariateSpline on a control x control net; nothing where scipy is not installed.
+  // Seconds of scipy.interpolate.LSQBivariateSpline on a control x control net; nothing where scipy is not
+  // installed.
   std::optional<double> seconds(int control) const;
 
  private:

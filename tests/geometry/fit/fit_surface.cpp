@@ -136,7 +136,8 @@ TEST_CASE("the chosen net follows the data, and a stated tolerance coarsens it")
   CHECK(bic->surface.control_u() <= fine->surface.control_u());
   CHECK(loose->surface.control_u() < fine->surface.control_u());
   CHECK(rms_error(loose->surface, everywhere) < 0.2);
-  // The theory of a net that can represent the truth: sigma sqrt(N / M); five deviations of a chi-squared of N.
+  // The theory of a net that can represent the truth: sigma sqrt(N / M); five deviations of a chi-squared
+  // of N.
   const double n = static_cast<double>(fine->surface.z.size());
   CHECK(rms_error(fine->surface, everywhere) <
         0.05 * std::sqrt(n / 40'000) * (1 + 5 / std::sqrt(2 * n)) * 1.2);
@@ -179,10 +180,17 @@ TEST_CASE("a hole is filled smoothly, and the surface outside does not feel it")
   const auto fitted = fit_surface(holed.columns(), {.control_u = 23, .control_v = 23});
   REQUIRE(fitted.has_value());
   CHECK(fitted->report.empty_cells > 5);
-  // What a thin plate held at the rim of a disk of radius R misses of a height with biharmonic q: q R^4 / 64 in the
-  // middle, that over sqrt(5) rms; the rim is a cell wide, and q at most (7^2 + 5^2)^2 times 5.
+  // What a thin plate held at the rim of a disk of radius R misses of a height with biharmonic q: q R^4 /
+  // 64 in the middle, that over sqrt(5) rms; the rim is a cell wide, and q at most (7^2 + 5^2)^2 times 5.
   CHECK(rms_error(fitted->surface, in_hole) < 74 * 74 * 5 * std::pow(0.13 + 0.05, 4) / 64 / std::sqrt(5.0));
   CHECK(rms_error(fitted->surface, far) < 1.05 * rms_error(whole->surface, far));
+  // The residual is that of the points, without the fairing's energy.
+  double squares = 0;
+  for (std::size_t i = 0; i < holed.u.size(); ++i) {
+    squares += std::pow(holed.z[i] - fitted->surface.at(holed.u[i], holed.v[i]).value.z(), 2);
+  }
+  const double points_held = static_cast<double>(holed.u.size());
+  CHECK(fitted->report.rms_residual == doctest::Approx(std::sqrt(squares / points_held)).epsilon(1e-9));
   // Without fairing it is an error that names a cell without points.
   const auto refused =
       fit_surface(holed.columns(), {.control_u = 23, .control_v = 23, .fairing = no_fairing});
@@ -281,8 +289,8 @@ TEST_CASE("what cannot be fitted is named with its place") {
             .error() == FitFailure{Error::knots_not_increasing, 5});
   CHECK(fit_surface(points.columns(), {.domain = {0, 0, 0, 1}}).error().error == Error::outside_domain);
 
-  // Every cell has points, but those of the last row of cells lie where it begins: nothing holds the last row of control
-  // points, whose functions are zero there.
+  // Every cell has points, but those of the last row of cells lie where it begins: nothing holds the last
+  // row of control points, whose functions are zero there.
   test::FitPoints lines;
   for (int i = 0; i < 40; ++i) {
     for (int j = 0; j < 40; ++j) {

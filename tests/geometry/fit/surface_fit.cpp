@@ -230,7 +230,8 @@ TEST_CASE("a height that a coarse net holds exactly is found exactly, and the co
 }
 
 TEST_CASE("what a coarser net misses decides against the tolerance which net is taken") {
-  // A ripple of 4 micrometres rms and 40 mm wavelength: 4 spans cannot follow it, 32 can, and the data show it clearly.
+  // A ripple of 4 micrometres rms and 40 mm wavelength: 4 spans cannot follow it, 32 can, and the data show
+  // it clearly.
   const PlanMap map(test::straight_outline(square));
   const Height rippled = [](double x, double) {
     return 100 + 0.0057 * std::sin(x * 2 * std::numbers::pi / 40);
