@@ -111,7 +111,8 @@ std::expected<BezierSurfaceFit, MatchingFailure> fit_bezier_surface(std::span<co
     const Eigen::MatrixXd unknown_part = ring_given ? Eigen::MatrixXd(matrix(Eigen::all, unknown)) : matrix;
     const auto singular = [&](const Eigen::MatrixXd& triangle) {
       const int column = static_cast<int>(unknown[free_column(triangle)]);
-      return std::unexpected(MatchingFailure{.what = Error::singular, .control = {column / nv, column % nv}});
+      return std::unexpected(MatchingFailure{
+          .what = Error::singular, .control = {column / nv, column % nv}, .condition = fit.condition});
     };
     Eigen::MatrixX3d found;
     Eigen::MatrixXd triangle;

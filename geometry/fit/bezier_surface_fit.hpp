@@ -14,7 +14,8 @@
 //              quarter of it by normal equations
 // Allocation   the matrix, a copy to factor, the result
 // Failure      MatchingFailure: not_finite, no_length, preimage_outside, coincident_stripes, too_few_stripes,
-//              too_few_points (a stripe whose degree is above the surface's), singular
+//              too_few_points (a stripe whose degree is above the surface's), singular (with the
+//              condition if by QR)
 #pragma once
 
 #include <Eigen/Core>

@@ -32,7 +32,7 @@ std::vector<SampledStripe> plate_stripes(int count, int points_a_stripe, const N
     const Vector2d high(std::min(1 - inset, (column + 1) / 3.0), std::min(1 - inset, (row + 1) / 3.0));
     const Vector2d error = noise.shot_mm * Vector2d(normal(random), normal(random)) / plate_size_mm;
     // The head turns from shot to shot, and the other way every second time: acute to every border.
-    const double slope = (shot % 2 == 0 ? 1 : -1) * (12 + 13.0 * shot / shots) * std::numbers::pi / 180;
+    const double slope = (shot % 2 == 0 ? 1 : -1) * (12 + 26.0 * shot / (shots - 1)) * std::numbers::pi / 180;
     const int stripes = count * (shot + 1) / shots - count * shot / shots;
     for (int s = 0; s < stripes; ++s) {
       const Vector2d along(std::sin(slope), std::cos(slope)), across(along.y(), -along.x());

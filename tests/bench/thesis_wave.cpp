@@ -24,6 +24,7 @@ constexpr int stripe_points = 81;
 struct NamedSurface {
   std::string name;
   BSplineSurface surface;
+  bool smooth = true;  // twenty control points a stripe follow it to 1e-6
 };
 
 // The thesis prints knots and peak, not the control net: four waves that fit what it does print.
@@ -36,23 +37,28 @@ std::vector<NamedSurface> waves() {
                           std::sin(2 * std::numbers::pi * place(j));
                  })});
   // Single control points of height 0.3 peak at 4/9 of it, 0.1333: nine of them, up and down by turns.
-  all.push_back({"nine control points", graph_surface(knots, knots, 1, [](int i, int j) {
-                   const bool inside = i >= 3 && i <= 7 && j >= 3 && j <= 7;
-                   if (!inside || i % 2 == 0 || j % 2 == 0) return 0.0;
-                   return ((i + j) / 2) % 2 == 1 ? 0.3 : -0.3;
-                 })});
+  all.push_back({"nine control points",
+                 graph_surface(knots, knots, 1,
+                               [](int i, int j) {
+                                 const bool inside = i >= 3 && i <= 7 && j >= 3 && j <= 7;
+                                 if (!inside || i % 2 == 0 || j % 2 == 0) return 0.0;
+                                 return ((i + j) / 2) % 2 == 1 ? 0.3 : -0.3;
+                               }),
+                 false});
   all.push_back({"diagonal, wavy border", graph_surface(knots, knots, 1, [&](int i, int j) {
                    return std::sin(2 * std::numbers::pi * (place(i) + place(j)));
                  })});
   // Control points at equal distances: x(u) and y(v) are not straight.
-  all.push_back({"strong, x(u), y(v) uneven", graph_surface(knots, knots, 1, [](int i, int j) {
-                   return ((i / 2 + j / 2) % 2 == 0 ? 1.0 : -1.0) * (0.6 + 0.04 * i);
-                 })});
+  all.push_back(
+      {"strong, x(u), y(v) uneven",
+       graph_surface(knots, knots, 1,
+                     [](int i, int j) { return ((i / 2 + j / 2) % 2 == 0 ? 1.0 : -1.0) * (0.6 + 0.04 * i); }),
+       false});
   for (int i = 0; i < spans + 3; ++i) {
     all.back().surface.x.row(i).setConstant(i / (spans + 2.0));
     all.back().surface.y.col(i).setConstant(i / (spans + 2.0));
   }
-  for (auto& [name, surface] : all) {
+  for (auto& [name, surface, smooth] : all) {
     double highest = 0;
     for (double u = 0; u <= 1; u += 1.0 / 256)
       for (double v = 0; v <= 1; v += 1.0 / 256)
@@ -135,11 +141,11 @@ Json thesis_wave(const Options& options) {
                "wave (ours: net not printed)", "stripes", "pieces", "cond", "chord length (the thesis)",
                "distance", "consistent t, literal", "the same, by length", "points", "plan view");
   }
-  double literal_average = 0, plan_max = 0, points_max = 0;
+  double smooth_average = 0, strong_average = 0, plan_max = 0, points_max = 0;
   const auto all_waves = waves();
   auto all_layouts = layouts();
   if (options.quick) all_layouts.resize(2);
-  for (const auto& [wave, truth] : all_waves) {
+  for (const auto& [wave, truth, smooth] : all_waves) {
     const BSplineSurface base = coons_base(truth);
     const PlanMap map(outline_of(truth));
     for (const auto& [layout, lines] : all_layouts) {
@@ -162,6 +168,7 @@ Json thesis_wave(const Options& options) {
                        of_weighted = compare(weighted.surface, truth),
                        of_points = compare(points.surface, truth), of_plan = compare(plan.surface, truth),
                        of_base = compare(base, truth);
+      double& literal_average = smooth ? smooth_average : strong_average;
       literal_average = std::max(literal_average, of_consistent.height.average);
       plan_max = std::max(plan_max, of_plan.height.max);
       points_max = std::max(points_max, of_points.height.max);
@@ -187,12 +194,15 @@ Json thesis_wave(const Options& options) {
                  of_points.height.max, of_plan.height.max);
     }
   }
-  result["literal_consistent_avg"] = literal_average;
+  result["literal_consistent_avg"] = smooth_average;
+  result["literal_consistent_avg_strong"] = strong_average;
   result["plan_view_max"] = plan_max;
   result["exact_points_max"] = points_max;
   if (!options.quiet)
-    fmt::print("Largest: literal system with consistent t {:.1e} average; plan view {:.1e} at most.\n",
-               literal_average, plan_max);
+    fmt::print(
+        "Largest: literal system with consistent t {:.1e} average (smooth waves), {:.1e} (the two strong "
+        "ones); plan view {:.1e} at most.\n",
+        smooth_average, strong_average, plan_max);
   return result;
 }
 

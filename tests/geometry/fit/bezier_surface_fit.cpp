@@ -165,6 +165,7 @@ TEST_CASE("stripes that leave a Bezier surface free are refused by name") {
     REQUIRE(!fit.has_value());
     CHECK(fit.error().what == Error::singular);
     CHECK(fit.error().control.i >= 0);
+    if (method == LeastSquares::qr) CHECK(fit.error().condition > 1e13);
     CHECK(fit.error().control.j >= 0);
   }
 }
