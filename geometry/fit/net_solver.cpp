@@ -44,7 +44,11 @@ void NetSolver::start(const NetTask& task, ShotOffsets* shots) {
 
 template <typename Piece>
 bool NetSolver::advance(int end, double cost_of_one, Piece&& piece, int grain) {
-  const int room = static_cast<int>((work_a_step - work_) / cost_of_one) / grain * grain;
+  const int room = static_cast<int>((budget_ - work_) / cost_of_one) / grain * grain;
+  if (room < grain && work_ > 0) {
+    full_ = true;
+    return false;
+  }
   const int to = std::min(end, cursor_ + std::max(grain, room));
   piece(cursor_, to);
   work_ += (to - cursor_) * cost_of_one;
@@ -179,9 +183,10 @@ template <typename Piece>
 bool NetSolver::each_shot(double cost_of_cell, Piece&& piece) {
   while (cursor_ < shots_->count()) {
     const std::size_t all = shots_->cells_of(cursor_);
-    const auto room = static_cast<std::size_t>(std::max(0.0, work_a_step - work_) / cost_of_cell);
+    const auto room = static_cast<std::size_t>(std::max(0.0, budget_ - work_) / cost_of_cell);
     const std::size_t end = std::min(all, shot_cell_ + room);
-    if (end == shot_cell_ && end < all) return false;
+    full_ = end < all;
+    if (end == shot_cell_ && full_) return false;
     piece(cursor_, shot_cell_, end);
     work_ += 30 + cost_of_cell * static_cast<double>(end - shot_cell_);
     shot_cell_ = end;
@@ -269,11 +274,19 @@ bool NetSolver::step_shots() {
   }
 }
 
-std::expected<bool, Error> NetSolver::step() {
+std::expected<bool, Error> NetSolver::step(double budget) {
+  work_ = 0, budget_ = budget, full_ = false;
+  // The phases of a small net are far shorter than a step: it takes as many as fit.
+  while (true) {
+    const auto ready = piece();
+    if (!ready || *ready || full_ || work_ >= budget_) return ready;
+  }
+}
+
+std::expected<bool, Error> NetSolver::piece() {
   const SplineNet& net = *task_.net;
   const int n = size(), rows = task_.moments->cells_u(), cells = task_.moments->cells_v();
   const double band = net.half_band();
-  work_ = 0;
   switch (phase_) {
     case Phase::clear:
       if (advance(n, band + 3, [&](int a, int b) {

@@ -63,7 +63,7 @@ class NetSolver {
   NetSolver(std::size_t max_unknowns, std::size_t max_half_band);
 
   void start(const NetTask&, ShotOffsets*);
-  std::expected<bool, Error> step();
+  std::expected<bool, Error> step(double budget = work_a_step);  // of multiply-adds
   std::expected<void, Error> solve();  // all steps
   double progress() const;
   const NetResult& result() const { return result_; }
@@ -98,6 +98,7 @@ class NetSolver {
   };
 
   int size() const { return task_.net->unknowns(); }
+  std::expected<bool, Error> piece();  // as much of one phase as the step has room for
   // Advances the cursor by one slice; true when it has reached `end`, and then it starts again from 0.
   template <typename Piece>
   bool advance(int end, double cost_of_one, Piece&& piece, int grain = 1);
@@ -125,7 +126,8 @@ class NetSolver {
   std::size_t shot_cell_ = 0;
   bool norm_wanted_ = false;
   double trace_data_ = 0, fairing_ = 0, sparse_fairing_ = 0, rho_ = 0, objective_ = 0, border_squares_ = 0;
-  double work_ = 0, norm_one_ = 0;
+  double work_ = 0, budget_ = work_a_step, norm_one_ = 0;
+  bool full_ = false;  // the next piece does not fit into the step any more
 };
 
 }  // namespace moldloft::geometry

@@ -70,6 +70,7 @@ struct SurfaceFit::Work {
   void fold(int of_shot);
   void take_totals();
   void start_level();
+  std::expected<bool, Error> piece();
   bool merge_some();
   void keep_if_best();
   void finish();
@@ -91,6 +92,7 @@ struct SurfaceFit::Work {
   std::size_t shot_cell = 0, shot_cells = 0;  // of the shot that merging is at
   double best_score = 0, point_sigma = 0;
   double work = 0;
+  bool full = false;  // merging stopped because the step has no room for the next piece
   PointBlock block;
   std::array<double, PointBlock::capacity> u, v;
 };
@@ -272,40 +274,49 @@ void SurfaceFit::Work::keep_if_best() {
 void SurfaceFit::Work::finish() { map->to_net(levels[best].surface); }
 
 std::expected<bool, Error> SurfaceFit::step() {
-  Work& work = *work_;
-  work.work = 0;
-  switch (work.phase) {
-    case Work::Phase::adding:
+  // Small nets and short phases share a step. Half of a step leaves room for the largest piece that cannot be divided.
+  work_->work = 0, work_->full = false;
+  while (true) {
+    const auto ready = work_->piece();
+    if (!ready || *ready || work_->full || work_->work >= NetSolver::work_a_step / 2) return ready;
+  }
+}
+
+std::expected<bool, Error> SurfaceFit::Work::piece() {
+  switch (phase) {
+    case Phase::adding:
       return std::unexpected(Error::too_few_points);
-    case Work::Phase::failed:
-      return std::unexpected(work.error);
-    case Work::Phase::done:
+    case Phase::failed:
+      return std::unexpected(error);
+    case Phase::done:
       return true;
-    case Work::Phase::merge:
-      if (!work.merge_some()) return false;
-      if (work.level < work.first_level) {
-        ++work.level;
+    case Phase::merge:
+      full = !merge_some();
+      if (full) return false;
+      if (level < first_level) {
+        ++level;
       } else {
-        work.start_level();
+        start_level();
       }
       return false;
-    case Work::Phase::solve: {
-      const auto solved = work.solver.step();
-      work.work = work.solver.work();
+    case Phase::solve: {
+      const auto solved = solver.step(NetSolver::work_a_step - work);
+      work += solver.work();
       if (!solved) {
-        work.error = solved.error(), work.phase = Work::Phase::failed;
-        return std::unexpected(work.error);
+        error = solved.error(), phase = Phase::failed;
+        return std::unexpected(error);
       }
-      if (*solved) work.phase = Work::Phase::compare;
+      if (*solved) phase = Phase::compare;
       return false;
     }
-    case Work::Phase::compare:
-      work.keep_if_best();
-      work.phase = ++work.level < work.levels.size() ? Work::Phase::merge : Work::Phase::finish;
+    case Phase::compare:
+      keep_if_best();
+      work += 10.0 * levels[level].net.unknowns();
+      phase = ++level < levels.size() ? Phase::merge : Phase::finish;
       return false;
-    case Work::Phase::finish:
-      work.finish();
-      work.phase = Work::Phase::done;
+    case Phase::finish:
+      finish();
+      phase = Phase::done;
       return true;
   }
   return true;
