@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 
 namespace moldloft::geometry {
 
 namespace {
 
 constexpr int cell = 4;  // control points of a cell along one axis
+constexpr double rounding = 256 * std::numeric_limits<double>::epsilon();  // of a pivot, by its diagonal
 
 struct Range {
   int first, end;  // of the cell's four, those that are unknown
@@ -64,7 +66,9 @@ std::expected<PivotReport, NetIndex> MatchingSystem::factor() {
   for (int n = 0; n < size(); ++n) {
     // Where the factorization stopped, the pivot still stands on the diagonal, and it is not positive.
     const double root = band_.entry(n, n), pivot = root > 0 ? root * root / diagonal[n] : 0;
-    if (!(pivot > least_pivot)) return std::unexpected(control_of(n));
+    // A small pivot before has magnified the rounding in this one as much as it has shrunk itself.
+    const double least = std::max(least_pivot, rounding / report.smallest);
+    if (!(pivot > least)) return std::unexpected(control_of(n));
     if (pivot < report.smallest) report = {pivot, control_of(n)};
   }
   if (!done) return std::unexpected(control_of(size() - 1));

@@ -22,7 +22,8 @@ struct PivotReport {
 
 class MatchingSystem {
  public:
-  // Below this a pivot is rounding: the control point follows from the others, not from the data.
+  // Below this (or more, after a small pivot) a pivot is rounding: the control point follows from the others,
+  // not from the data.
   static constexpr double least_pivot = 1e-12;
 
   enum class Ring { unknown, given };
