@@ -33,6 +33,8 @@ TEST_CASE("the default run completes, and its summary says everything that it pr
   const double seconds = s["cycle"]["seconds"].get<double>();
   CHECK(seconds > 5);
   CHECK(seconds < 60);
+  // Of cell time: a step of the fit is charged its whole quantum, whatever the machine.
+  CHECK(s["surface"]["ready_after_last_frame_ms"].get<double>() <= 50);
   CHECK(s["cycle"]["idle_fraction"].get<double>() >= 0);
   CHECK(s["cycle"]["idle_fraction"].get<double>() <= s["cycle"]["standing_fraction"].get<double>());
   CHECK(s["cycle"]["standing_fraction"].get<double>() < 1);

@@ -376,6 +376,8 @@ TEST_CASE("adding and solving take no memory, and no step more than the stated w
   CHECK(progress == 1);
   CHECK(rising);
   CHECK(most_work <= SurfaceFit::work_a_step);
+  // A step goes on until a third of the stated work is done, but where the next piece cannot be divided.
+  CHECK(pieces <= 3 * all_work / SurfaceFit::work_a_step + 5);
   // What the factors of the five nets alone take must be in the count.
   CHECK(all_work > 0.5 * 35 * 35 * 108 * 108);
   MESSAGE("" << all_work / 1e6 << " million multiply-adds, at most " << most_work << " a step");
