@@ -37,7 +37,7 @@ struct Candidate {
 std::expected<void, FitFailure> check(const FitSettings& settings) {
   if (!settings.knots_u.empty() || !settings.knots_v.empty()) {
     for (const auto* knots : {&settings.knots_u, &settings.knots_v}) {
-      if (const auto good = check_knots(*knots); !good) return good;
+      if (const auto good = check_net_knots(*knots); !good) return good;
     }
   }
   const FitDomain& d = settings.domain;

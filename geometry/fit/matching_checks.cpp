@@ -53,7 +53,7 @@ std::expected<void, MatchingFailure> check_tracks(std::span<const double> knots_
                                                   std::span<const StripeTrack> stripes,
                                                   std::span<const SampledTrack> samples) {
   for (const auto knots : {knots_u, knots_v})
-    if (const auto good = check_knots(knots); !good)
+    if (const auto good = check_cubic_knots(knots); !good)
       return std::unexpected(MatchingFailure{.what = good.error()});
   const auto blame = [](Error what, std::size_t stripe) {
     return std::unexpected(MatchingFailure{.what = what, .stripe = static_cast<int>(stripe)});
@@ -61,7 +61,7 @@ std::expected<void, MatchingFailure> check_tracks(std::span<const double> knots_
   std::vector<Eigen::Vector2d> from, to;
   std::vector<int> straight;
   for (std::size_t s = 0; s < stripes.size(); ++s) {
-    if (const auto good = check_knots(stripes[s].knots); !good) return blame(good.error(), s);
+    if (const auto good = check_cubic_knots(stripes[s].knots); !good) return blame(good.error(), s);
     if (const auto good = check_preimage(stripes[s].preimage, stripes[s].knots, knots_u, knots_v); !good)
       return blame(good.error(), s);
     const std::vector<Eigen::Vector2d>& uv = stripes[s].preimage.uv;

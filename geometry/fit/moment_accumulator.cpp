@@ -35,23 +35,34 @@ UniformCells uniform_cells(const MomentGrid& grid, const FitDomain& domain) {
 
 }  // namespace
 
-std::expected<void, FitFailure> check_knots(std::span<const double> knots) {
-  const auto bad = [](std::size_t i) { return std::unexpected(FitFailure{Error::knots_not_increasing, i}); };
-  if (knots.size() < 2 * cubic + 2) return std::unexpected(FitFailure{Error::too_few_points, knots.size()});
-  const std::size_t last = knots.size() - 1;
-  std::size_t run = 1;
-  for (std::size_t i = 0; i <= last; ++i) {
-    if (!std::isfinite(knots[i])) return std::unexpected(FitFailure{Error::not_finite, i});
-    if (i == 0) continue;
-    if (knots[i] < knots[i - 1]) return bad(i);
-    run = knots[i] == knots[i - 1] ? run + 1 : 1;
-    const bool at_end = knots[i] == knots[0] || knots[i] == knots[last];
-    if (run > (at_end ? 4u : 3u)) return bad(i);
+std::expected<void, FitFailure> check_net_knots(std::span<const double> knots) {
+  const auto good = check_cubic_knots(knots);
+  if (good) return {};
+  const std::size_t n = knots.size();
+  const auto first_where = [&](auto&& wrong) {
+    std::size_t i = 0;
+    while (i < n && !wrong(i)) ++i;
+    return i;
+  };
+  const auto blame = [&](std::size_t where) { return std::unexpected(FitFailure{good.error(), where}); };
+  switch (good.error()) {
+    case Error::not_finite:
+      return blame(first_where([&](std::size_t i) { return !std::isfinite(knots[i]); }));
+    case Error::knots_not_increasing:
+      return blame(first_where([&](std::size_t i) { return i > 0 && knots[i] < knots[i - 1]; }));
+    case Error::knots_not_clamped:
+      return blame(first_where([&](std::size_t i) {
+        return i <= cubic ? knots[i] != knots[0] : i + cubic + 1 >= n && knots[i] != knots[n - 1];
+      }));
+    case Error::knot_too_often:  // beyond the third, at an end beyond the fourth
+      return blame(first_where([&](std::size_t i) {
+        const bool at_end = knots[i] == knots[0] || knots[i] == knots[n - 1];
+        const std::size_t most = at_end ? cubic + 1 : cubic;
+        return i >= most && knots[i] == knots[i - most];
+      }));
+    default:
+      return blame(n);
   }
-  if (!(knots[cubic] == knots[0] && knots[cubic] < knots[cubic + 1])) return bad(cubic);
-  if (!(knots[last - cubic] == knots[last] && knots[last - cubic - 1] < knots[last]))
-    return bad(last - cubic);
-  return {};
 }
 
 MomentAccumulator::MomentAccumulator(int cells_u, int cells_v, const FitDomain& domain, double datum,

@@ -42,15 +42,14 @@ struct FitDomain {  // of the columns u and v
   bool operator==(const FitDomain&) const = default;
 };
 
-// Knots that a cubic net can live on: finite, not decreasing, the ends four times, interior ones at most
-// three times over.
-std::expected<void, FitFailure> check_knots(std::span<const double> knots);
+// What check_cubic_knots() finds, and the first knot that it is about (for a wrong count, how many there are).
+std::expected<void, FitFailure> check_net_knots(std::span<const double> knots);
 
 class MomentAccumulator {
  public:
   // Equal cells. Heights are summed relative to `datum`: one near the data keeps the digits of their squares.
   MomentAccumulator(int cells_u, int cells_v, const FitDomain& = {}, double datum = 0, Simd = widest_simd());
-  // The cells of a net over knots that pass check_knots(); the columns are its parameters.
+  // The cells of a net over knots that pass check_net_knots(); the columns are its parameters.
   MomentAccumulator(const SplineNet&, double datum, Simd = widest_simd());
 
   std::expected<void, FitFailure> add(const PointColumns&);

@@ -47,16 +47,6 @@ Preimage straight_preimage(const Eigen::Vector2d& from, const Eigen::Vector2d& t
   return {{0.0, 1.0}, {from, to}};
 }
 
-std::expected<void, Error> check_knots(std::span<const double> knots) {
-  if (knots.size() < 2 * cubic + 2) return std::unexpected(Error::too_few_points);
-  if (!std::ranges::all_of(knots, [](double knot) { return std::isfinite(knot); }))
-    return std::unexpected(Error::not_finite);
-  if (!std::ranges::is_sorted(knots)) return std::unexpected(Error::knots_not_increasing);
-  for (std::size_t i = 0; i + cubic + 1 < knots.size(); ++i)
-    if (!(knots[i] < knots[i + cubic + 1])) return std::unexpected(Error::knots_not_increasing);
-  return {};
-}
-
 std::expected<void, Error> check_preimage(const Preimage& preimage, std::span<const double> stripe_knots,
                                           std::span<const double> knots_u, std::span<const double> knots_v) {
   const auto& [t, uv] = preimage;

@@ -35,9 +35,6 @@ struct StripePiece {
   double length() const { return (uv1 - uv0).norm(); }
 };
 
-// Whether `knots` can carry cubic splines: finite, nondecreasing, and every basis function has a support.
-std::expected<void, Error> check_knots(std::span<const double> knots);
-
 // Whether the pre-image has length everywhere and stays in [knots_u domain] x [knots_v domain]; the knots are
 // valid.
 std::expected<void, Error> check_preimage(const Preimage&, std::span<const double> stripe_knots,

@@ -1,5 +1,5 @@
-// The cells between the distinct knots of one direction, and which of them a parameter lies in: a table of equal buckets
-// leads to the first cell that may hold it, so that nothing is searched.
+// The cells between the distinct knots of one direction, and which of them a parameter lies in: a table of equal
+// buckets leads to the first cell that may hold it, so that nothing is searched.
 //
 // Units        the knots' parameter
 // Cost         locate() 2-3 ns; built in O(cells + buckets)

@@ -44,6 +44,10 @@ std::expected<void, Error> check_knots(std::span<const double> knots, int degree
   return {};
 }
 
+std::expected<void, Error> check_cubic_knots(std::span<const double> knots) {
+  return check_knots(knots, cubic, static_cast<int>(knots.size()) - cubic - 1);
+}
+
 int search_span(std::span<const double> knots, double t, int degree) {
   const int last = static_cast<int>(knots.size()) - degree - 2;
   if (!(t > knots[degree])) return degree;

@@ -28,6 +28,9 @@ std::vector<double> uniform_clamped_knots(int spans, int degree = cubic);
 // stands more than p times: the spline would fall apart there).
 std::expected<void, Error> check_knots(std::span<const double> knots, int degree, int control_points);
 
+// The same for knots that decide themselves how many control points there are.
+std::expected<void, Error> check_cubic_knots(std::span<const double> knots);
+
 // The span index k with knots[k] <= t < knots[k+1] (the last span for t = 1); t is clamped to the domain.
 inline int find_span(std::span<const double> knots, double t, int degree = cubic);
 

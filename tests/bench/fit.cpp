@@ -105,7 +105,8 @@ Json nets(const FitJob& job, const Options& options, const Table& table) {
       keep(native::moldloft_plain_eigen_fit(u.data(), v.data(), job.z.data(), job.size(), n, plain.data()));
     });
     // FITPACK takes more than a minute for the largest net.
-    const auto fitpack_s = options.quick && n > 23 ? std::nullopt : fitpack.seconds(n);
+    std::optional<double> fitpack_s;
+    if (!options.quick || n <= 23) fitpack_s = fitpack.seconds(n);
     const FitError error = error_of(ours.surface);
     double apart = 0;
     for (int i = 0; i < n; ++i) {
@@ -118,7 +119,7 @@ Json nets(const FitJob& job, const Options& options, const Table& table) {
     row["rms_mm"] = error.rms, row["max_mm"] = error.max, row["bytes"] = ours.report.bytes;
     row["theory_rms_mm"] = theory, row["eigen_apart_mm"] = apart;
     out.push_back(row);
-    const std::string fitpack_words = fitpack_s ? fmt::format("{:.3f}", fitpack_s.value_or(0)) : "absent";
+    const std::string fitpack_words = fitpack_s ? fmt::format("{:.3f}", *fitpack_s) : "absent";
     table.line(
         "  {:>3} x {:<3}{:>8.5f} {:>9.4f} {:>9} {:>7.1f} {:>10.3e} {:>10.3e} {:>10.3e} {:>9} {:>10.1e}", n, n,
         our.median, eigen.median, fitpack_words, eigen.median / our.median, error.rms, theory, error.max,

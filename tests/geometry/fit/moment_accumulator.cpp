@@ -140,7 +140,7 @@ TEST_CASE("the ends of any domain belong to its last cells") {
 
 TEST_CASE("cells of uneven knots are found as by search") {
   std::vector<double> knots{0, 0, 0, 0, 0.001, 0.002, 0.3, 0.3, 0.7, 0.99, 1, 1, 1, 1};
-  REQUIRE(check_knots(knots).has_value());
+  REQUIRE(check_net_knots(knots).has_value());
   const SpanTable table(knots);
   CHECK(table.spans() == 6);
   const KnotCells& cells = table.cells();
@@ -152,17 +152,18 @@ TEST_CASE("cells of uneven knots are found as by search") {
                               : unit(random) * (i % 3 == 0 ? 0.004 : 1);
     const int cell = cells.locate(t);
     CHECK(table[cell].first + 3 == find_span(knots, t));
-    CHECK(cells.local(cell, t) == doctest::Approx((t - table[cell].begin) / (table[cell].end - table[cell].begin)));
+    CHECK(cells.local(cell, t) ==
+          doctest::Approx((t - table[cell].begin) / (table[cell].end - table[cell].begin)));
   }
 }
 
 TEST_CASE("knots that cannot carry a cubic net are named") {
-  const auto failure = [](std::vector<double> knots) { return check_knots(knots).error(); };
-  CHECK(failure({0, 0, 0, 0, 1, 1, 1}) == FitFailure{Error::too_few_points, 7});
+  const auto failure = [](std::vector<double> knots) { return check_net_knots(knots).error(); };
+  CHECK(failure({0, 0, 0, 0, 1, 1, 1}) == FitFailure{Error::knots_wrong_count, 7});
   CHECK(failure({0, 0, 0, 0, 0.5, 0.4, 1, 1, 1, 1}) == FitFailure{Error::knots_not_increasing, 5});
   CHECK(failure({0, 0, 0, 0, NAN, 0.4, 1, 1, 1, 1}) == FitFailure{Error::not_finite, 4});
-  CHECK(failure({0, 0, 0, 0.1, 0.5, 1, 1, 1, 1}) == FitFailure{Error::knots_not_increasing, 3});
-  CHECK(failure({0, 0, 0, 0, 0.5, 0.5, 0.5, 0.5, 1, 1, 1, 1}) == FitFailure{Error::knots_not_increasing, 7});
-  CHECK(failure({0, 0, 0, 0, 0.5, 1, 1, 1, 1, 1}) == FitFailure{Error::knots_not_increasing, 9});
-  CHECK(check_knots(std::vector<double>{0, 0, 0, 0, 0.5, 0.5, 0.5, 1, 1, 1, 1}).has_value());
+  CHECK(failure({0, 0, 0, 0.1, 0.5, 1, 1, 1, 1}) == FitFailure{Error::knots_not_clamped, 3});
+  CHECK(failure({0, 0, 0, 0, 0.5, 0.5, 0.5, 0.5, 1, 1, 1, 1}) == FitFailure{Error::knot_too_often, 7});
+  CHECK(failure({0, 0, 0, 0, 0.5, 1, 1, 1, 1, 1}) == FitFailure{Error::knot_too_often, 9});
+  CHECK(check_net_knots(std::vector<double>{0, 0, 0, 0, 0.5, 0.5, 0.5, 1, 1, 1, 1}).has_value());
 }

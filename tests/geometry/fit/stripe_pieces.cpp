@@ -110,10 +110,4 @@ TEST_CASE("what is wrong with a pre-image or with knots has a name") {
         Error::knots_not_increasing);
   CHECK(what_is_wrong({{0.0, 0.5}, {{0, 0}, {0.1, 0}}}) ==
         Error::preimage_outside);  // the stripe goes on to t = 1
-  CHECK(check_knots(std::vector<double>{0, 0, 0, 0, 0.6, 0.5, 1, 1, 1, 1}).error() ==
-        Error::knots_not_increasing);
-  CHECK(check_knots(std::vector<double>{0, 0, 0, 0, 0.5, 0.5, 0.5, 0.5, 0.5, 1, 1, 1, 1}).error() ==
-        Error::knots_not_increasing);
-  CHECK(check_knots(std::vector<double>{0, 0, 0, 0, nan, 1, 1, 1, 1}).error() == Error::not_finite);
-  CHECK(check_knots(std::vector<double>{0, 0, 0, 1, 1, 1}).error() == Error::too_few_points);
 }

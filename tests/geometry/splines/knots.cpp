@@ -123,3 +123,12 @@ TEST_CASE("averaged and balanced knots leave every span its parameters") {
     }
   }
 }
+
+TEST_CASE("cubic knots that decide the number of control points themselves are refused by name") {
+  const auto refused = [](std::vector<double> knots) { return check_cubic_knots(knots).error(); };
+  CHECK(refused({0, 0, 0, 0, 0.6, 0.5, 1, 1, 1, 1}) == Error::knots_not_increasing);
+  CHECK(refused({0, 0, 0, 0, 0.5, 0.5, 0.5, 0.5, 1, 1, 1, 1}) == Error::knot_too_often);
+  CHECK(refused({0, 0, 0, 0, std::nan(""), 1, 1, 1, 1}) == Error::not_finite);
+  CHECK(refused({0, 0, 0, 1, 1, 1}) == Error::knots_wrong_count);
+  CHECK(check_cubic_knots(std::vector<double>{0, 0, 0, 0, 0.5, 0.5, 0.5, 1, 1, 1, 1}).has_value());
+}
