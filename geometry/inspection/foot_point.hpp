@@ -2,8 +2,8 @@
 //
 // Method       Newton on (r - p) . r_u = (r - p) . r_v = 0 with second derivatives (as Piegl and Tiller, The
 //              NURBS Book, 6.1, but as a minimization): every step solves the quadratic model on the
-//              parameter rectangle exactly, is taken only as far as it gets nearer, and uses the Gauss-Newton
-//              matrix where the Hessian is not positive. The global search is branch and bound over the boxes
+//              parameter rectangle exactly, is taken only as far as it gets nearer, and on a Hessian shifted
+//              until it is positive where it is not. The global search is branch and bound over the boxes
 //              of the Bezier patches, cut finer until the squared distance is convex on each piece that is
 //              left
 // Frame        the surface's, mm
