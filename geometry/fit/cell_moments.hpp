@@ -1,6 +1,6 @@
 // What the surface fit keeps of its points: per cell of a net 7 x 7 sums of B6 B6 and 4 x 4 sums of z B3
-// B3. They are all that least squares with bicubic splines over these cells needs (field notes, "Bernstein
-// moments"), and the moments of a coarser net follow from them exactly. A row of the 7 x 7 carries an
+// B3. They are all that least squares with bicubic splines over these cells needs, and the moments of a
+// coarser net follow from them exactly. A row of the 7 x 7 carries an
 // eighth sum, w z^2 B6_p, so that the squares of the heights are known cell by cell too.
 //
 // Cost         add: 56 + 16 multiply-adds (the plain form; moment_kernel.hpp has the fast one); merge:

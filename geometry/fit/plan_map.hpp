@@ -1,6 +1,6 @@
 // The plan map X(u, v) = (x, y): the bilinearly blended Coons patch of the outline's four sides (thesis eq.
 // 2.65), and its inverse. The plate is explicit (z over x, y), so a point's parameters are those of its plan
-// position: safe where projecting on a wavy base surface is not (field notes on the thesis's wave surface).
+// position: safe where projecting on a wavy base surface is not (fit/README.md, figures of the wave).
 //
 // Outside [0, 1]^2 the sides go on along their end tangents.
 //

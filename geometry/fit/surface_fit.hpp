@@ -5,8 +5,7 @@
 //              repeatability), a zero-mean random effect with standard deviation shot_sigma_mm: overlapping
 //              shots and neighbours estimate it together with the surface. (u, v) are plan-view parameters
 //              (plan_map.hpp)
-// Moments      per cell 7 x 7 of B6 B6 and 4 x 4 of z B3 B3 (field notes, "Bernstein moments"), per shot 4
-//              x 4 of B3 B3
+// Moments      per cell 7 x 7 of B6 B6 and 4 x 4 of z B3 B3 (cell_moments.hpp), per shot 4 x 4 of B3 B3
 // Fairing      a thin-plate term, tiny relative to the data, so that cells without points stay defined
 // Frame        world, mm
 // Work         add() costs O(points) and is called with bounded chunks; step() does one bounded piece of

@@ -71,8 +71,8 @@ Json floors(const FitJob& job, const Options& options, const Table& table) {
   const double basis = ns([&] { keep(native::moldloft_basis_floor(u.data(), v.data(), job.size(), 20)); });
   out["read_ns"] = read, out["basis_ns"] = basis;
   table.line("per point, 450,000 points, 20 x 20 cells (least of {} runs)", runs);
-  table.line("  read three columns                        {:7.2f} ns   field notes 0.27..1.0", read);
-  table.line("  span, 4 + 4 basis values, 16 products     {:7.2f} ns   field notes 2.4", basis);
+  table.line("  read three columns                        {:7.2f} ns   0.27..1.0 elsewhere", read);
+  table.line("  span, 4 + 4 basis values, 16 products     {:7.2f} ns   2.4 elsewhere", basis);
   Json kernels = Json::array();
   for (const auto simd : {geometry::Simd::portable, geometry::Simd::avx2, geometry::Simd::avx512}) {
     if (!geometry::machine_has(simd)) continue;
@@ -125,7 +125,7 @@ Json nets(const FitJob& job, const Options& options, const Table& table) {
         our.median, eigen.median, fitpack_words, eigen.median / our.median, error.rms, theory, error.max,
         ours.report.bytes, apart);
   }
-  table.line("  field notes, same job: prototype 0.0029 / 0.0033 / 0.0153 s, Eigen 0.26 / 0.27 / 0.32,");
+  table.line("  elsewhere, same job: moments 0.0029 / 0.0033 / 0.0153 s, Eigen 0.26 / 0.27 / 0.32,");
   table.line("  FITPACK 0.53 / 2.15 / 74.7, GoTools 0.40 / 0.40 / 0.52, PCL on_nurbs 10 / 12 / 14");
   return out;
 }
@@ -147,7 +147,7 @@ Json automatic(const FitJob& job, const Options& options, double fixed_s, const 
       "  {} x {} in {:.4f} s = {:.1f} x the fixed 23 x 23 (asked: <= 10), rms {:.3e} mm (asked: <= 7e-4)",
       chosen.surface.control_u(), chosen.surface.control_v(), taken.median, taken.median / fixed_s,
       error.rms);
-  table.line("  field notes: FITPACK with s = M 16.9 s, 1.04e-3; GoTools LR 2.7 s, 1.37e-3");
+  table.line("  elsewhere: FITPACK with s = M 16.9 s, 1.04e-3; GoTools LR 2.7 s, 1.37e-3");
   return out;
 }
 

@@ -1,4 +1,4 @@
-// Fit job P (field notes, section 2): nine shots of 50,000 points in 100 stripes each, at 12 to 38 degrees,
+// Fit job P: nine shots of 50,000 points in 100 stripes each, at 12 to 38 degrees,
 // over a plate of 305 x 305 mm that is bent by +-20 mm; sigma 0.025 mm. Deterministic: the same bits on
 // every machine with IEEE doubles and the same sine.
 #pragma once

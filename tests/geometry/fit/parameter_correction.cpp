@@ -162,7 +162,7 @@ TEST_CASE("points with their own parameters give their surface back, ring kept o
 }
 
 TEST_CASE("the thesis's wave is found from chord-length parameters, where point-distance steps crawl") {
-  // Prototypes of this method reach 3e-10..8e-6 (egg crate) and 4e-9..9e-6 (diagonal) in 30 corrections.
+  // Other programs of this method reached 3e-10..8e-6 (egg crate) and 4e-9..9e-6 (diagonal) in 30 corrections.
   for (const Wave kind : {Wave::egg_crate, Wave::diagonal}) {
     const BSplineSurface truth = wave(kind);
     for (const auto& stripes : {parallel_stripes(truth), oblique_stripes(truth)}) {
