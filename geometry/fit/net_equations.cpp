@@ -3,15 +3,11 @@
 #include <algorithm>
 #include <cassert>
 
+#include "geometry/splines/gauss_nodes.hpp"
+
 namespace moldloft::geometry {
 
 namespace {
-
-// Four Gauss nodes and weights on [0, 1]: exact to degree 7, and a product of two cubics has 6.
-constexpr std::array<double, 4> gauss_node{0.06943184420297371, 0.33000947820757187, 0.66999052179242813,
-                                           0.93056815579702629};
-constexpr std::array<double, 4> gauss_weight{0.17392742256872693, 0.32607257743127307, 0.32607257743127307,
-                                             0.17392742256872693};
 
 int half_band_of(int free_u, int free_v, int block) { return block * (3 * std::min(free_u, free_v) + 4) - 1; }
 
