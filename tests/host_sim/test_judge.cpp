@@ -5,6 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "hal/temporary_folder.hpp"
 #include "host_sim/judge.hpp"
 
 using namespace moldloft;
@@ -108,8 +109,8 @@ TEST_CASE("an outline 0.25 mm too large is 0.25 sqrt 2 off at its corners") {
 
 TEST_CASE("a run folder is judged and its summary gets the truth") {
   namespace fs = std::filesystem;
-  const fs::path folder = fs::temp_directory_path() / "moldloft_test_run";
-  fs::create_directories(folder);
+  const moldloft::hal::TemporaryFolder own;
+  const fs::path folder = own.path();
   const auto plate = saddle();
   const auto surface = saddle_surface(plate, 0.1, 0);
   nlohmann::json control = nlohmann::json::array(), corners = nlohmann::json::array();
@@ -135,5 +136,4 @@ TEST_CASE("a run folder is judged and its summary gets the truth") {
   fs::remove(folder / "surface.json");
   CHECK(judge_run(folder.string(), plate).error().what ==
         (folder / "surface.json").string() + ": cannot be opened");
-  fs::remove_all(folder);
 }

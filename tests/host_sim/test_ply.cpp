@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "hal/temporary_folder.hpp"
 #include "host_sim/mesh_plate.hpp"
 #include "host_sim/plan_polygon.hpp"
 
@@ -14,17 +15,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// A file of one test's own: cases run beside each other.
 class File {
  public:
-  explicit File(const std::string& content)
-      : path_(fs::temp_directory_path() / fs::path("moldloft_test.ply")) {
-    std::ofstream(path_, std::ios::binary) << content;
-  }
-  ~File() { fs::remove(path_); }
-  std::string path() const { return path_.string(); }
+  explicit File(const std::string& content) { std::ofstream(path(), std::ios::binary) << content; }
+  std::string path() const { return folder_.file("plate.ply"); }
 
  private:
-  fs::path path_;
+  moldloft::hal::TemporaryFolder folder_;
 };
 
 std::string why(const std::string& content) {
