@@ -20,6 +20,7 @@
 
 namespace moldloft::hal {
 
+class FlightRecorder;
 class RunStore;
 
 class Recorder {
@@ -30,7 +31,8 @@ class Recorder {
     std::size_t largest_frame_bytes = 1u << 20;
   };
 
-  explicit Recorder(const Sizes&);
+  // `flight`, when given, is told of the same bytes and transitions, so that its last second shows them.
+  explicit Recorder(const Sizes&, FlightRecorder* flight = nullptr);
   ~Recorder();
 
   // ---- the control thread's side
@@ -38,10 +40,10 @@ class Recorder {
   void event(const EventRecord&) noexcept;
   void shot(const ShotRecord&) noexcept;
   bool room_for_frame() const noexcept;
-  std::uint64_t lost() const noexcept;                                // records dropped since the start
-  std::uint64_t offset(LinkId, Direction) const noexcept;             // bytes recorded so far
-  std::size_t plan_bytes() const noexcept;                            // both rings
-  std::size_t high_water_bytes() const noexcept;                      // the fullest that they have been
+  std::uint64_t lost() const noexcept;                     // records dropped since the start
+  std::uint64_t offset(LinkId, Direction) const noexcept;  // bytes recorded so far
+  std::size_t plan_bytes() const noexcept;                 // both rings
+  std::size_t high_water_bytes() const noexcept;           // the fullest that they have been
 
   // ---- the other side
   // Moves everything that is there into the store, in one transaction; false when the store refused.
@@ -52,6 +54,7 @@ class Recorder {
  private:
   struct Rings;
   std::unique_ptr<Rings> rings_;
+  FlightRecorder* flight_;
 };
 
 }  // namespace moldloft::hal
