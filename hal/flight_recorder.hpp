@@ -1,13 +1,14 @@
-// The flight recorder: the last second or so of ticks, always on, in a ring of fixed size. What goes wrong freezes it a few
-// ticks later, so that a dump shows what led there and what came of it; another thread writes the dump and lets it run on.
+// The flight recorder: the last second or so of ticks, always on, in a ring of fixed size. What goes wrong freezes
+// it a few ticks later, so that a dump shows what led there and what came of it; another thread writes the dump and
+// lets it run on.
 //
-// Thread       name(), tick(), note(), transition(), trigger(): the control thread. frozen(), due(), dump(), thaw():
-//              one other thread; dump() also from a signal handler, where it is the last thing that happens
+// Thread       name(), tick(), note(), transition(), trigger(): the control thread. frozen(), due(), dump(),
+//              thaw(): one other thread; dump() also from a signal handler, where it is the last thing that happens
 // Blocking     never, but dump() writes to a file
 // Allocation   in the constructor only
 // Cost         note() about 3 ns: 16 bytes into a ring
-// Failure      a trigger while another is being dumped is counted in later_triggers() and otherwise ignored; after `dumps`
-//              dumps triggers are ignored, so that a sick machine does not fill its disk
+// Failure      a trigger while another is being dumped is counted in later_triggers() and otherwise ignored; after
+//              `dumps` dumps triggers are ignored, so that a sick machine does not fill its disk
 #pragma once
 
 #include <array>
