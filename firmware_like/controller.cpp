@@ -55,7 +55,8 @@ Controller::Controller(const CellConfig& config, hal::Clock& clock, hal::ByteLin
       transmit_robot_{Row{this, &Controller::transmit_robot}},
       transmit_scanner_{Row{this, &Controller::transmit_scanner}},
       health_{Row{this, &Controller::watch_health}},
-      scheduler_{clock, {.tick = config.tick, .missed = config.missed_ticks}, &flight_} {
+      scheduler_{
+          clock, {.tick = config.tick, .guard = slack_guard, .missed = config.missed_ticks}, &flight_} {
   const std::array<tasks::Task*, task_table.size()> rows{&receive_scanner_, &receive_robot_,    &cell_,
                                                          &transmit_robot_,  &transmit_scanner_, &health_};
   for (std::size_t i = 0; i < rows.size(); ++i) scheduler_.add(task_table[i], *rows[i]);
@@ -120,6 +121,8 @@ MemoryPlan Controller::memory() const {
   const auto fixed = [](const char* name, std::size_t bytes) { return MemoryItem{name, bytes, bytes}; };
   return {
       {"recorder rings", recorder_.plan_bytes(), recorder_.high_water_bytes()},
+      fixed("scanner driver", scanner_->plan_bytes()),
+      fixed("robot driver", robot_->plan_bytes()),
       fixed("cell and tracker", cell_.plan_bytes()),
       fixed("outline", surface_.outline_bytes()),
       {"boundary reserve", surface_.reserve_bytes(), surface_.reserve_used_bytes()},

@@ -5,6 +5,7 @@
 
 #include "firmware_like/export_command.hpp"
 #include "firmware_like/machines.hpp"
+#include "firmware_like/replay_command.hpp"
 #include "firmware_like/run_command.hpp"
 
 using namespace moldloft::firmware_like;
@@ -31,6 +32,16 @@ int main(int argc, char** argv) {
   export_command->add_option("--step", to_cad.step, "the STEP file to write (AP242)");
   export_command->add_option("--iges", to_cad.iges, "the IGES file to write (5.3)");
 
+  ReplayOptions replay;
+  auto* replay_command = app.add_subcommand("replay", "what a stored run did, in order of time");
+  replay_command->add_option("run", replay.run, "the run's folder, or one dump of the flight recorder")
+      ->required();
+  replay_command->add_flag("--timeline", replay.timeline, "the flight recorder's dumps, tick by tick");
+  replay_command->add_option("--ticks", replay.ticks, "how many before the trigger")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1'000'000));
+  replay_command->add_flag("--all", replay.all_ticks, "all ticks that a dump holds");
+
   auto* machines_command = app.add_subcommand("machines", "print the state machines as Mermaid diagrams");
 
   try {
@@ -41,6 +52,7 @@ int main(int argc, char** argv) {
   if (*run_command) return run_cell(run);
   if (*fit_command) return fit_run(fit);
   if (*export_command) return export_run(to_cad);
+  if (*replay_command) return replay_run(replay);
   if (*machines_command) {
     fmt::print("{}", machine_diagrams());
     return exit_done;

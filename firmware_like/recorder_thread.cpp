@@ -11,8 +11,8 @@ constexpr auto drain_period = 10ms;
 
 }  // namespace
 
-RecorderThread::RecorderThread(hal::Recorder& recorder, hal::RunStore& store)
-    : recorder_{recorder}, store_{store}, thread_{[this] { work(); }} {}
+RecorderThread::RecorderThread(hal::Recorder& recorder, hal::RunStore& store, FlightFiles& flight)
+    : recorder_{recorder}, store_{store}, flight_{flight}, thread_{[this] { work(); }} {}
 
 RecorderThread::~RecorderThread() {
   ending_ = true;
@@ -22,6 +22,7 @@ RecorderThread::~RecorderThread() {
 void RecorderThread::work() {
   while (!ending_) {
     recorder_.drain(store_);
+    flight_.write_if_frozen();
     clock_.sleep_until(clock_.now() + drain_period);
   }
   recorder_.drain(store_);

@@ -1,9 +1,11 @@
-// The ordinary thread that empties the recorder's rings onto the disk every few milliseconds.
+// The ordinary thread that empties the recorder's rings onto the disk every few milliseconds, and writes the flight
+// recorder's dumps.
 #pragma once
 
 #include <atomic>
 #include <thread>
 
+#include "firmware_like/flight_files.hpp"
 #include "hal/clock.hpp"
 #include "hal/recorder.hpp"
 #include "hal/run_store.hpp"
@@ -12,7 +14,7 @@ namespace moldloft::firmware_like {
 
 class RecorderThread {
  public:
-  RecorderThread(hal::Recorder&, hal::RunStore&);
+  RecorderThread(hal::Recorder&, hal::RunStore&, FlightFiles&);
   ~RecorderThread();  // empties the rings a last time
   RecorderThread(const RecorderThread&) = delete;
   RecorderThread& operator=(const RecorderThread&) = delete;
@@ -21,6 +23,7 @@ class RecorderThread {
   void work();
   hal::Recorder& recorder_;
   hal::RunStore& store_;
+  FlightFiles& flight_;
   hal::SteadyClock clock_;
   std::atomic<bool> ending_{false};
   std::thread thread_;

@@ -130,6 +130,11 @@ Json timing_of(const Controller& c) {
   j["pushed_by_background"] = histogram_json(s.pushed());
   j["frame_to_command"] = histogram_json(c.cell().frame_to_command());
   j["data_age"] = histogram_json(c.cell().data_age());
+  if (const auto drift = c.cell().scanner_clock().estimate())
+    j["scanner_clock"] = {{"drift_ppm", drift->ppm},
+                          {"sigma_ppm", drift->sigma_ppm},
+                          {"scatter_us", drift->scatter_us},
+                          {"readings", drift->pairs}};
   for (const auto& t : s.tasks()) {
     j["tasks"].push_back({{"name", std::string{t.spec.name}},
                           {"period_ticks", t.spec.period_ticks},

@@ -169,7 +169,9 @@ int run_cell(const RunOptions& options) {
       ControllerOptions{.archive = folder->archive.get(), .epoch = fresh_epoch()});
   guard.stops(controller->cell());
   {
-    const RecorderThread recorder{controller->recorder(), *folder->store};
+    FlightFiles flight{controller->flight(), folder->path};
+    const CrashDump crash{*controller, folder->path};
+    const RecorderThread recorder{controller->recorder(), *folder->store, flight};
     const DisplayThread display{controller->cell(), memory_line(*controller)};
     controller->start();
     while (controller->tick()) {

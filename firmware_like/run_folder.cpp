@@ -6,6 +6,7 @@
 #include <ctime>
 
 #include "firmware_like/config.hpp"
+#include "firmware_like/flight_files.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -70,6 +71,7 @@ void discard_run(RunFolder run) {
   run.store.reset();  // closes the file
   remove_store(run.path);
   std::error_code not_empty;
+  for (const auto& dump : flight_dumps(run.path)) fs::remove(dump, not_empty);
   if (run.made_folder) fs::remove(run.path, not_empty);
 }
 

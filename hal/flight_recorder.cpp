@@ -60,6 +60,10 @@ void FlightRecorder::name(int task, std::string_view text) noexcept {
 void FlightRecorder::tick(Instant woken, Duration late, std::uint64_t number) noexcept {
   tick_number_ = number;
   note(FlightKind::tick, 0, woken, late);
+  if (requested_.load(std::memory_order_relaxed)) {
+    requested_.store(false, std::memory_order_relaxed);
+    trigger(FlightCause::request, -1, woken);
+  }
   if (state_.load(std::memory_order_relaxed) != State::triggered) return;
   if (ticks_to_freeze_-- == 0) state_.store(State::frozen, std::memory_order_release);
 }

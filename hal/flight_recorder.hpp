@@ -46,6 +46,9 @@ class FlightRecorder {
   void trigger(FlightCause, int task, Instant at) noexcept;
   std::uint64_t later_triggers() const noexcept { return later_triggers_; }
 
+  // ---- from anywhere, a signal handler included: the next tick triggers
+  void request() noexcept { requested_.store(true, std::memory_order_relaxed); }
+
   // ---- the other side
   bool frozen() const noexcept { return state_.load(std::memory_order_acquire) == State::frozen; }
   // A trigger has come, whether its ticks have passed or not: what is left to write when the run ends.
@@ -81,6 +84,7 @@ class FlightRecorder {
   std::uint64_t later_triggers_ = 0, tick_number_ = 0;
   FlightHeader header_{};
   std::atomic<State> state_{State::running};
+  std::atomic<bool> requested_{false};
   std::atomic<std::uint32_t> dumps_left_;
 };
 

@@ -49,6 +49,7 @@ class LineRobot final : public Robot {
   std::optional<RobotEvent> next_event() override { return events_.pop(); }
   RobotState state() const override;
   std::string_view why() const override { return why_; }
+  std::size_t plan_bytes() const override { return sizeof *this; }
 
   robot_line::Status last_status() const { return status_; }
   std::uint64_t garbled_lines() const { return garbled_lines_; }    // received, and thrown away

@@ -21,21 +21,47 @@ namespace moldloft::hal::psc1 {
 
 constexpr std::size_t header_size = 32;
 constexpr std::size_t payload_crc_size = 4;
-constexpr std::uint32_t max_payload = 8u << 20;  // a length beyond this is refused even under a valid header CRC
+constexpr std::uint32_t max_payload = 8u
+                                      << 20;  // a length beyond this is refused even under a valid header CRC
 constexpr std::uint8_t protocol_version = 1;
 constexpr std::uint16_t default_port = 4014;
 
 enum class Type : std::uint8_t {
-  hello = 1, config = 2, trigger = 3, exposed = 4, frame = 5, status = 6, ping = 7, error = 8, reset = 9
+  hello = 1,
+  config = 2,
+  trigger = 3,
+  exposed = 4,
+  frame = 5,
+  status = 6,
+  ping = 7,
+  error = 8,
+  reset = 9
 };
 
 enum class Status : std::uint16_t {
-  ok = 0, bad_state = 1, bad_argument = 2, unsupported = 3, busy = 4, sensor_fault = 5, timeout = 6
+  ok = 0,
+  bad_state = 1,
+  bad_argument = 2,
+  unsupported = 3,
+  busy = 4,
+  sensor_fault = 5,
+  timeout = 6
 };
 
 enum class Encoding : std::uint8_t { int16 = 0, float32 = 1 };
 
-enum class Flaw { none, too_short, magic, header_crc, version, type, length, payload_crc, payload_size, content };
+enum class Flaw {
+  none,
+  too_short,
+  magic,
+  header_crc,
+  version,
+  type,
+  length,
+  payload_crc,
+  payload_size,
+  content
+};
 std::string_view to_string(Flaw);
 
 struct Header {
@@ -46,7 +72,9 @@ struct Header {
   std::uint64_t acquired_ns = 0;  // sensor clock; 0 where nothing was acquired
 };
 
-struct HelloRequest { std::uint8_t version_min = protocol_version, version_max = protocol_version; };
+struct HelloRequest {
+  std::uint8_t version_min = protocol_version, version_max = protocol_version;
+};
 struct HelloReply {
   Status status = Status::ok;
   std::uint8_t version = protocol_version;
@@ -62,7 +90,9 @@ struct Config {  // asked and, with a status, granted
   bool intensity = true;
   std::uint16_t stripes = 0, points_per_stripe = 0;  // 0: as many as the sensor has
 };
-struct Trigger { std::uint32_t shot_id = 0; };
+struct Trigger {
+  std::uint32_t shot_id = 0;
+};
 struct Exposed {
   std::uint32_t shot_id = 0, session_id = 0;
   bool repeated = false;  // the shot had been exposed before: the stored frame follows
@@ -124,5 +154,10 @@ std::expected<FrameHead, Flaw> decode_frame_head(std::span<const std::byte> payl
 
 // Fills `frame` (its arrays must be large enough) from a FRAME payload; NaN where a point is missing.
 std::expected<void, Flaw> decode_frame(std::span<const std::byte> payload, Frame& frame) noexcept;
+// The same in pieces: everything but the points, which is where all that can be wrong lies, ...
+std::expected<FrameHead, Flaw> begin_frame(std::span<const std::byte> payload, Frame& frame) noexcept;
+// ... then points `first` to `end` - 1 of the same payload: 2 ns a point.
+void decode_points(std::span<const std::byte> payload, const FrameHead&, std::size_t first, std::size_t end,
+                   Frame& frame) noexcept;
 
 }  // namespace moldloft::hal::psc1

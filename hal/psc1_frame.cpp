@@ -1,6 +1,5 @@
-// FRAME of PSC1: descriptor, stripe table, columns. A frame of 50,000 points is decoded in one tick's slack,
-// so the loops over points are written in blocks of a constant size, which the compiler turns into vector
-// code at -O2.
+// FRAME of PSC1: descriptor, stripe table, columns. Points are decoded in the slack of the ticks, so the loops over
+// them are written in blocks of a constant size, which the compiler turns into vector code at -O2.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -60,8 +59,8 @@ struct Points {
 // results go through locals: stores through three pointers that might overlap would keep the compiler from
 // vector code.
 template <std::size_t count>
-void decode_points(const Columns<std::int16_t>& from, std::size_t first, const FrameHead& head,
-                   Frame& frame) noexcept {
+void decode_block(const Columns<std::int16_t>& from, std::size_t first, const FrameHead& head,
+                  Frame& frame) noexcept {
   const auto x = load<std::int16_t, count>(from.x + first * 2);
   const auto y = load<std::int16_t, count>(from.y + first * 2);
   const auto z = load<std::int16_t, count>(from.z + first * 2);
@@ -79,7 +78,7 @@ void decode_points(const Columns<std::int16_t>& from, std::size_t first, const F
 }
 
 template <std::size_t count>
-void decode_points(const Columns<float>& from, std::size_t first, const FrameHead&, Frame& frame) noexcept {
+void decode_block(const Columns<float>& from, std::size_t first, const FrameHead&, Frame& frame) noexcept {
   const auto x = load<float, count>(from.x + first * 4);
   const auto y = load<float, count>(from.y + first * 4);
   const auto z = load<float, count>(from.z + first * 4);
@@ -95,12 +94,12 @@ void decode_points(const Columns<float>& from, std::size_t first, const FrameHea
 }
 
 template <typename T>
-void decode_columns(const std::byte* begin, const FrameHead& head, Frame& frame) noexcept {
-  const std::size_t points = head.point_count;
-  const Columns<T> from{begin, points};
-  std::size_t i = 0;
-  for (; i + block <= points; i += block) decode_points<block>(from, i, head, frame);
-  for (; i < points; ++i) decode_points<1>(from, i, head, frame);
+void decode_columns(const std::byte* begin, const FrameHead& head, std::size_t first, std::size_t end,
+                    Frame& frame) noexcept {
+  const Columns<T> from{begin, head.point_count};
+  std::size_t i = first;
+  for (; i + block <= end; i += block) decode_block<block>(from, i, head, frame);
+  for (; i < end; ++i) decode_block<1>(from, i, head, frame);
 }
 
 // Stripes come in ascending index, their points in the columns in the same order and inside them.
@@ -246,9 +245,9 @@ std::expected<FrameHead, Flaw> decode_frame_head(std::span<const std::byte> payl
   return head;
 }
 
-std::expected<void, Flaw> decode_frame(std::span<const std::byte> payload, Frame& frame) noexcept {
+std::expected<FrameHead, Flaw> begin_frame(std::span<const std::byte> payload, Frame& frame) noexcept {
   const auto head = decode_frame_head(payload);
-  if (!head) return std::unexpected{head.error()};
+  if (!head) return head;
   if (payload.size() !=
       payload_size(head->stripe_count, head->point_count, head->encoding, head->intensity)) {
     return std::unexpected{Flaw::payload_size};
@@ -264,18 +263,29 @@ std::expected<void, Flaw> decode_frame(std::span<const std::byte> payload, Frame
   ByteReader from{payload.subspan(head_size)};
   if (const auto stripes = decode_stripes(from, *head, frame); !stripes) {
     frame.stripe_count = frame.point_count = 0;
-    return stripes;
+    return std::unexpected{stripes.error()};
   }
-  const auto columns = from.take(from.left());
-  if (head->encoding == Encoding::int16) {
-    decode_columns<std::int16_t>(columns.data(), *head, frame);
+  return head;
+}
+
+void decode_points(std::span<const std::byte> payload, const FrameHead& head, std::size_t first,
+                   std::size_t end, Frame& frame) noexcept {
+  const auto columns = payload.subspan(head_size + std::size_t{head.stripe_count} * stripe_size);
+  if (head.encoding == Encoding::int16) {
+    decode_columns<std::int16_t>(columns.data(), head, first, end, frame);
   } else {
-    decode_columns<float>(columns.data(), *head, frame);
+    decode_columns<float>(columns.data(), head, first, end, frame);
   }
-  const auto intensity = columns.last(head->intensity ? head->point_count : 0);
-  std::ranges::fill(std::span{frame.intensity}.first(head->point_count), std::uint8_t{0});
-  std::ranges::transform(intensity, frame.intensity.begin(),
-                         [](std::byte b) { return std::to_integer<std::uint8_t>(b); });
+  const auto intensity = std::span{frame.intensity}.subspan(first, end - first);
+  if (!head.intensity) return std::ranges::fill(intensity, std::uint8_t{0}), void();
+  if (!intensity.empty())
+    std::memcpy(intensity.data(), columns.last(head.point_count).data() + first, intensity.size());
+}
+
+std::expected<void, Flaw> decode_frame(std::span<const std::byte> payload, Frame& frame) noexcept {
+  const auto head = begin_frame(payload, frame);
+  if (!head) return std::unexpected{head.error()};
+  decode_points(payload, *head, 0, head->point_count, frame);
   return {};
 }
 

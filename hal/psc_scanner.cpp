@@ -223,6 +223,8 @@ void PscScanner::receive(Instant now) {
     if (link_.state() == LinkState::open) cue(Cue::link_open, now);
     return;
   }
+  // The bytes of the last frame lie where the next message would go.
+  if (!unpack(settings_.points_a_tick)) return;
   for (std::size_t budget = settings_.bytes_a_tick; budget > 0;) {
     const std::size_t count = read_some(budget);
     if (count == 0) break;
@@ -236,7 +238,18 @@ void PscScanner::receive(Instant now) {
     take_message(now);
     if (phase_ == Phase::waiting) return;  // the message was the connection's last
     incoming_ = {};
+    if (packed_) return;
   }
+}
+
+bool PscScanner::unpack(std::size_t at_most_points) {
+  if (!packed_) return true;
+  const std::size_t end = unpacked_ + std::min<std::size_t>(at_most_points, packed_->point_count - unpacked_);
+  // The message's bytes are still where they were received.
+  decode_points(std::span<const std::byte>{body_}.first(frame_bytes_), *packed_, unpacked_, end, frame_);
+  unpacked_ = end;
+  if (end == packed_->point_count) packed_.reset();
+  return !packed_;
 }
 
 // Reads what is missing of the header, or of the body, and never beyond: nothing is copied twice.
@@ -365,8 +378,9 @@ void PscScanner::on_frame(std::span<const std::byte> payload, Instant now) {
     ++stale_frames_;
     return;
   }
-  if (const auto decoded = decode_frame(payload, frame_); !decoded)
-    return broken(now, "FRAME", decoded.error());
+  const auto begun = begin_frame(payload, frame_);
+  if (!begun) return broken(now, "FRAME", begun.error());
+  packed_ = *begun, unpacked_ = 0;
   frame_.exposed_sensor_ns = incoming_.head.acquired_ns;
   frame_.arrived = now;
   frame_offset_ = incoming_.payload_offset;

@@ -39,8 +39,11 @@ class PscScanner final : public Scanner {
     Duration last_back_off = 2s;      // a scanner that has booted is found within this time
     int retries = 2;                  // of one shot, after the first attempt
 
-    std::size_t bytes_a_tick = 64u << 10;  // half a tick of a 1 Gb/s line; bounds what one receive() costs
-    std::uint32_t max_stripes = 200;       // of one frame; larger ones are refused at CONFIG
+    // A quarter of a tick of a 1 Gb/s line, three ticks of a 100 Mb/s line; with points_a_tick it bounds what one
+    // receive() costs.
+    std::size_t bytes_a_tick = 32u << 10;
+    std::size_t points_a_tick = 2048;  // unpacked by receive() where nobody asks for them
+    std::uint32_t max_stripes = 200;   // of one frame; larger ones are refused at CONFIG
     std::uint32_t max_points = 100'000;
   };
 
@@ -55,6 +58,7 @@ class PscScanner final : public Scanner {
   ScannerState state() const override;
   const ScannerInfo& info() const override { return info_; }
   const Frame& frame() const override { return frame_; }
+  bool unpack(std::size_t at_most_points) override;
   std::uint64_t frame_offset() const override { return frame_offset_; }
   std::uint32_t frame_bytes() const override { return frame_bytes_; }
   std::string_view why() const override { return why_; }
@@ -65,8 +69,8 @@ class PscScanner final : public Scanner {
   }  // whole and valid, but of another shot or session
   std::uint64_t broken_streams() const {
     return broken_streams_;
-  }                                // connections dropped for bytes that were wrong
-  std::size_t plan_bytes() const;  // memory taken at construction
+  }  // connections dropped for bytes that were wrong
+  std::size_t plan_bytes() const override;
 
  private:
   enum class Phase { idle, waiting, opening, greeting, configuring, ready, exposing, computing };
@@ -169,7 +173,9 @@ class PscScanner final : public Scanner {
   Instant heard_at_{0}, pinged_at_{0};
   Duration back_off_{0};
   std::uint32_t request_id_ = 0;
-  std::uint64_t received_ = 0;  // all bytes ever read from the link
+  std::uint64_t received_ = 0;             // all bytes ever read from the link
+  std::optional<psc1::FrameHead> packed_;  // of the frame in body_ whose points are not all in frame_
+  std::size_t unpacked_ = 0;               // points that are
   std::uint64_t frame_offset_ = 0;
   std::uint32_t frame_bytes_ = 0;
   std::uint64_t stale_frames_ = 0, broken_streams_ = 0;

@@ -27,12 +27,12 @@ enum class RobotState {
 
 struct RobotEvent {
   enum class Kind {
-    ready,      // synchronised; pose says where the arm stands, calibrated whether it knows that
-    moving,     // the command was checked and motion has started
-    done,       // stopped and settled; pose was read back
-    refused,    // ERR: the controller will not do it; code says why
-    fault,      // e-stop, power loss, watchdog, error during motion; latched
-    lost,       // the link is gone or the robot is silent beyond the limit
+    ready,    // synchronised; pose says where the arm stands, calibrated whether it knows that
+    moving,   // the command was checked and motion has started
+    done,     // stopped and settled; pose was read back
+    refused,  // ERR: the controller will not do it; code says why
+    fault,    // e-stop, power loss, watchdog, error during motion; latched
+    lost,     // the link is gone or the robot is silent beyond the limit
   };
   Kind kind;
   Pose pose{};
@@ -58,6 +58,7 @@ class Robot {
   virtual std::optional<RobotEvent> next_event() = 0;
   virtual RobotState state() const = 0;
   virtual std::string_view why() const = 0;
+  virtual std::size_t plan_bytes() const = 0;  // memory taken at construction
 };
 
 }  // namespace moldloft::hal

@@ -9,6 +9,7 @@
 #include "firmware_like/run_command.hpp"
 #include "host_sim/campaign.hpp"
 #include "host_sim/cell_options.hpp"
+#include "host_sim/day.hpp"
 #include "host_sim/device_host.hpp"
 #include "host_sim/judge.hpp"
 #include "host_sim/simulated_run.hpp"
@@ -76,6 +77,21 @@ void add_campaign_command(CLI::App& app, CampaignOptions& options) {
   command->add_flag("--json", options.json, "an array of objects instead of the table");
 }
 
+void add_day_command(CLI::App& app, DayOptions& options) {
+  auto* command =
+      app.add_subcommand("day", "plate after plate in virtual time, and what must not grow meanwhile");
+  add_cell_options(*command, options.cell);
+  command->add_option("--hours", options.hours, "of cell time")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 1e4));
+  command->add_option("--every", options.every_s, "seconds from one plate's start to the next")
+      ->capture_default_str();
+  command->add_option("--rows", options.rows, "of the table")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  command->add_flag("--json", options.json, "one object instead of the table");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -99,6 +115,9 @@ int main(int argc, char** argv) {
   CampaignOptions campaign;
   add_campaign_command(app, campaign);
 
+  DayOptions day;
+  add_day_command(app, day);
+
   CellDescription judged;
   std::string folder;
   auto* judged_command = app.add_subcommand("judge", "compare a run's results with the truth");
@@ -113,5 +132,6 @@ int main(int argc, char** argv) {
   if (devices_command->parsed()) return run_devices(devices);
   if (app.got_subcommand("cell")) return cell_command(run);
   if (app.got_subcommand("campaign")) return run_campaign(campaign);
+  if (app.got_subcommand("day")) return show_day(day);
   return judge_command(folder, judged);
 }

@@ -7,6 +7,7 @@
 #include "firmware_like/run_command.hpp"
 #include "hal/cable.hpp"
 #include "host_sim/cell_config.hpp"
+#include "host_sim/world_clock.hpp"
 
 namespace moldloft::host_sim {
 namespace {
@@ -14,26 +15,8 @@ namespace {
 using firmware_like::Controller;
 using firmware_like::Json;
 
-constexpr double serial_bytes_per_second = 11520;  // 115200 baud, 8N1
 constexpr int ticks_between_drains = 10;
 constexpr int ticks_between_reports = 200;
-
-// Virtual time that carries the simulated devices along.
-class WorldClock final : public hal::VirtualClock {
- public:
-  void carry(SimulatedWorld& world) { world_ = &world; }
-  void pace_by_wall() { wall_.emplace(); }
-
- protected:
-  void advance(hal::Instant wake) noexcept override {
-    if (wall_) wall_->sleep_until(wake);
-    if (world_ != nullptr) world_->step(wake);
-  }
-
- private:
-  SimulatedWorld* world_ = nullptr;
-  std::optional<hal::SteadyClock> wall_;
-};
 
 Json truth_json(const Verdict& v) {
   return {{"normal_max_mm", v.normal_max_mm},

@@ -22,6 +22,7 @@
 #include "hal/scanner.hpp"
 #include "tasks/boundary_tracker.hpp"
 #include "tasks/cell_state.hpp"
+#include "tasks/clock_drift.hpp"
 #include "tasks/motion_guard.hpp"
 #include "tasks/scan_plan.hpp"
 #include "tasks/scheduler.hpp"
@@ -104,6 +105,7 @@ class Cell final : public Task {
   const Histogram& frame_to_command() const { return frame_to_command_; }
   // ... and from the end of its exposure, as the scanner reported it: how old the data were.
   const Histogram& data_age() const { return data_age_; }
+  const ClockDrift& scanner_clock() const { return scanner_clock_; }  // since the scanner's last start
   std::size_t view_bytes() const { return view_.bytes(); }
   std::size_t plan_bytes() const;
 
@@ -155,7 +157,7 @@ class Cell final : public Task {
   void set_phase(Phase);
   void measure();
   void advance_phase();
-  void look_at(const Order&, const hal::Frame&);
+  void look_at(const Order&, const hal::Frame&, hal::Scanner* unpacks);
   void use_shot();
   std::optional<double> learn_heights(const geometry::RigidMotion& world_from_scanner);
   void use_boundary_shot(const Order&, const geometry::RigidMotion& world_from_scanner,
@@ -199,6 +201,8 @@ class Cell final : public Task {
   std::uint64_t points_seen_ = 0;
   CycleTimes cycle_;
   Histogram frame_to_command_, data_age_;
+  ClockDrift scanner_clock_;
+  std::uint32_t scanner_session_ = 0;
   hal::LatestValue<CellProgress> published_;
 };
 

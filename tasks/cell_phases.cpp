@@ -73,14 +73,18 @@ void Cell::advance_phase() {
 }
 
 // Hands a shot's frame to the background work for finding the plate in it; use_shot() follows when that is done.
-void Cell::look_at(const Order& order, const hal::Frame& frame) {
+void Cell::look_at(const Order& order, const hal::Frame& frame, hal::Scanner* unpacks) {
   ++taken_[static_cast<std::size_t>(order.purpose)];
   points_seen_ += frame.point_count;
   looked_at_ = order;
   const geometry::RigidMotion world_from_scanner = motion_of(order.reported) * settings_.tip_from_scanner;
   // Nobody knows a plate's height before it was seen; from then on the hint is good to a step's slope.
   const double reach = order.purpose == ShotPurpose::seek ? settings_.depth_mm : hint_reach_mm;
-  view_.begin(frame, world_from_scanner.inverse() * hint_in_world(order), reach);
+  view_.begin(frame,
+              {.hint = world_from_scanner.inverse() * hint_in_world(order),
+               .reach_mm = reach,
+               .boundary = order.purpose != ShotPurpose::surface},
+              unpacks);
   surface_.look(view_);
   looking_ = true;
 }

@@ -39,7 +39,8 @@ void Cell::sequence() {
 // The next frame would overwrite the last one: nobody may need that any more.
 bool Cell::frame_is_done() const {
   const auto stage = surface_.stage();
-  return !looking_ && stage != SurfaceTask::Stage::folding && stage != SurfaceTask::Stage::folding_reserve;
+  return !looking_ && !surface_.keeping() && stage != SurfaceTask::Stage::folding &&
+         stage != SurfaceTask::Stage::folding_reserve;
 }
 
 bool Cell::may_expose() const {
@@ -162,6 +163,8 @@ void Cell::give_up(const hal::Message& text) {
 void Cell::deliver() {
   const auto& frame = scanner_.frame();
   last_frame_ = frame.arrived;
+  if (std::exchange(scanner_session_, frame.session_id) != frame.session_id) scanner_clock_.reset();
+  scanner_clock_.add(exposed_.exposed_at, frame.exposed_sensor_ns);
   recorder_.shot({.at = frame.arrived,
                   .shot_id = exposed_.shot_id,
                   .purpose = exposed_.purpose,
@@ -170,7 +173,7 @@ void Cell::deliver() {
                   .reported = exposed_.reported,
                   .payload_offset = scanner_.frame_offset(),
                   .payload_bytes = scanner_.frame_bytes()});
-  look_at(exposed_, frame);
+  look_at(exposed_, frame, &scanner_);
 }
 
 // A surface shot that the archive leaves out before later ones was given up when the run was recorded, and
@@ -200,7 +203,7 @@ bool Cell::deliver_archived() {
   record("shot", "archived", "", "");
   if (phase_ == Phase::scan_surface) next_surface_shot();
   last_frame_ = now_;
-  look_at(exposed_, *shot->frame);
+  look_at(exposed_, *shot->frame, nullptr);
   return true;
 }
 

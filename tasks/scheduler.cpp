@@ -149,7 +149,7 @@ bool Scheduler::step_background(std::size_t i, Instant& t, Instant limit, bool& 
   running_.store(id, std::memory_order_relaxed);
   const Instant began = t;
   background_[i]->step(std::max(limit, began + record.spec.quantum));
-  if (const Instant measured = clock_.now(); measured == began) clock_.charge(record.spec.quantum);
+  if (const Instant measured = clock_.now(); measured == began) clock_.charge(record.spec.nominal);
   t = clock_.now();
   const Duration cost = t - began;
   if (flight_ != nullptr) flight_->note(FlightKind::background, id, began, cost);

@@ -22,9 +22,11 @@ std::size_t ShotView::bytes() const {
   return finder_.bytes() + viewer_.bytes() + stripes_.capacity() * sizeof(geometry::StripeView);
 }
 
-void ShotView::begin(const hal::Frame& frame, const Eigen::Vector3d& hint, double reach_mm) {
-  settings_.runs.hint_reach_mm = reach_mm;
-  hint_ = hint;
+void ShotView::begin(const hal::Frame& frame, const Request& request, hal::Scanner* unpacks) {
+  settings_.runs.hint_reach_mm = request.reach_mm;
+  request_ = request;
+  unpacks_ = unpacks;
+  stage_ = Stage::unpack;
   runs_ = {};
   boundary_ = {};
   stripes_.clear();
@@ -41,12 +43,38 @@ void ShotView::begin(const hal::Frame& frame, const Eigen::Vector3d& hint, doubl
 }
 
 bool ShotView::step() {
-  const auto cut = finder_.cut_stripes(stripes_a_step, settings_.runs);
-  if (cut && !*cut) return false;
-  if (const auto found = cut ? finder_.finish(hint_, settings_.runs) : std::unexpected{cut.error()}; found) {
-    runs_ = *found;
-    boundary_ = viewer_.look(runs_, stripes_.size(), settings_.boundary);
+  switch (stage_) {
+    case Stage::unpack:
+      if (unpacks_ == nullptr || unpacks_->unpack(points_a_step)) stage_ = Stage::cut;
+      return false;
+    case Stage::cut: {
+      const auto cut = finder_.cut_stripes(stripes_a_step, settings_.runs);
+      if (!cut) return end();
+      if (*cut) stage_ = Stage::find;
+      return false;
+    }
+    case Stage::find: {
+      const auto found = finder_.find_plate(runs_a_step, request_.hint, settings_.runs);
+      if (!found) return end();
+      if (!*found) return false;
+      runs_ = finder_.plate_runs();
+      if (!request_.boundary) return end();
+      viewer_.begin(runs_, stripes_.size(), settings_.boundary);
+      stage_ = Stage::boundary;
+      return false;
+    }
+    case Stage::boundary:
+      if (!viewer_.step()) return false;
+      boundary_ = viewer_.view();
+      return end();
+    case Stage::done:
+      return true;
   }
+  return true;
+}
+
+bool ShotView::end() {
+  stage_ = Stage::done;
   rewind(1);
   return true;
 }

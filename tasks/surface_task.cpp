@@ -16,6 +16,7 @@ SurfaceTask::SurfaceTask(const SurfaceTaskSettings& settings)
 void SurfaceTask::begin() {
   stage_ = Stage::idle;
   looking_at_ = nullptr;
+  keeping_from_ = nullptr;
   reserve_.clear();
   reserve_ends_.clear();
   reserve_next_ = reserve_shot_ = 0;
@@ -25,14 +26,23 @@ void SurfaceTask::begin() {
 void SurfaceTask::keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner) {
   if (reserve_ends_.size() == reserve_ends_.capacity()) return;  // the tracker gives up before this
   shot.rewind(settings_.reserve_stride);
-  std::size_t room = std::min(settings_.reserve_points_per_shot, reserve_.capacity() - reserve_.size());
-  while (room > 0) {
-    const std::size_t count = shot.next(std::span{chunk_}.first(std::min(room, chunk_.size())));
+  keeping_from_ = &shot;
+  world_from_scanner_ = world_from_scanner;
+  keep_end_ = std::min(reserve_.size() + settings_.reserve_points_per_shot, reserve_.capacity());
+}
+
+void SurfaceTask::step_keep() {
+  std::size_t left = kept_points;
+  while (left > 0 && reserve_.size() < keep_end_) {
+    const std::size_t count = keeping_from_->next(
+        std::span{chunk_}.first(std::min({left, keep_end_ - reserve_.size(), chunk_.size()})));
     if (count == 0) break;
-    for (std::size_t i = 0; i < count; ++i) reserve_.push_back(world_from_scanner * chunk_[i]);
-    room -= count;
+    for (std::size_t i = 0; i < count; ++i) reserve_.push_back(world_from_scanner_ * chunk_[i]);
+    left -= count;
   }
+  if (left == 0 && reserve_.size() < keep_end_) return;
   reserve_ends_.push_back(reserve_.size());
+  keeping_from_ = nullptr;
 }
 
 void SurfaceTask::build_outline(std::span<const Eigen::Vector2d> edges,
@@ -55,7 +65,7 @@ void SurfaceTask::solve() {
 }
 
 bool SurfaceTask::has_work() const {
-  return looking() || stage_ == Stage::choosing_corners || stage_ == Stage::building_outline ||
+  return looking() || keeping() || stage_ == Stage::choosing_corners || stage_ == Stage::building_outline ||
          stage_ == Stage::folding_reserve || stage_ == Stage::folding || stage_ == Stage::solving;
 }
 
@@ -64,6 +74,7 @@ void SurfaceTask::step(Instant) {
     if (looking_at_->step()) looking_at_ = nullptr;
     return;
   }
+  if (keeping()) return step_keep();
   switch (stage_) {
     case Stage::choosing_corners:
       return step_corners();

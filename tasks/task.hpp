@@ -60,7 +60,8 @@ struct TaskSpec {
 
 struct BackgroundSpec {
   std::string_view name;
-  Duration quantum = 200us;
+  Duration quantum = 200us;  // what a step may take on the slowest processor that we admit
+  Duration nominal = 200us;  // what it is charged where time is virtual
 };
 
 // ---- the proof of a table

@@ -15,7 +15,6 @@ constexpr double tangent_stretch_mm = 30;   // long enough for 0.1 degrees, shor
 constexpr std::size_t bridged_stripes = 2;  // stripes without an edge point that do not cut a piece
 constexpr double shortest_run_mm =
     3.5;  // a tip's last stripes are too short to count as runs (plate_runs.hpp)
-constexpr std::size_t max_corners = 8;  // of one piece; a plate has four
 
 double turn_between(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b));
@@ -133,11 +132,9 @@ void BoundaryViewer::walk_ring(View& view, std::size_t stripe_count, const Bound
   add_cap(0, cap(0, 1, ends_.front().stripe == 0), view.hidden_low_x_mm, -1);
 }
 
-// Cuts the ring at its breaks, starting behind the first so that no piece crosses the start of the walk.
-void BoundaryViewer::split_into_pieces(const BoundaryViewSettings& settings) {
+// The ring starts behind its first break, so that no stretch crosses the start of the walk.
+void BoundaryViewer::open_ring() {
   const std::size_t n = ring_.size();
-  points_.clear(), pieces_.clear();
-  if (n == 0) return;
   // A break after the last point is one before the first.
   if (!breaks_.empty() && breaks_.back().before == n) {
     const Break last = breaks_.back();
@@ -150,41 +147,36 @@ void BoundaryViewer::split_into_pieces(const BoundaryViewSettings& settings) {
   }
   // A ring without a break, a plate smaller than the field, is opened in the middle of its lower side.
   if (breaks_.empty()) breaks_.push_back({n / 4, false, false});
-  const std::size_t start = breaks_.front().before;
-  std::rotate_copy(ring_.begin(), ring_.begin() + start, ring_.end(), std::back_inserter(points_));
+  ring_start_ = breaks_.front().before;
+  std::rotate_copy(ring_.begin(), ring_.begin() + ring_start_, ring_.end(), std::back_inserter(points_));
   ring_.swap(points_);  // the ring keeps all points in order, points_ takes those that are believed
   points_.clear();
-  for (std::size_t b = 0; b < breaks_.size(); ++b) {
-    const Break& next = breaks_[(b + 1) % breaks_.size()];
-    const std::size_t from = breaks_[b].before - start;
-    const std::size_t to = b + 1 < breaks_.size() ? next.before - start : n;
-    const std::size_t begin = points_.size();
-    std::copy(ring_.begin() + from, ring_.begin() + to, std::back_inserter(points_));
-    std::size_t end = points_.size();
-    drop_false_points(begin, end);
-    points_.resize(end);
-    describe(begin, end, breaks_[b].starts_hidden, next.ends_hidden, settings);
-  }
 }
 
+// The points from the next break to the one after it.
+void BoundaryViewer::take_stretch() {
+  const std::size_t from = breaks_[next_break_].before - ring_start_;
+  const bool last = next_break_ + 1 == breaks_.size();
+  const std::size_t to = last ? ring_.size() : breaks_[next_break_ + 1].before - ring_start_;
+  stretch_begin_ = points_.size();
+  std::copy(ring_.begin() + from, ring_.begin() + to, std::back_inserter(points_));
+}
+
+// Once over the stretch. Judged against the unchanged points, dropped afterwards.
 void BoundaryViewer::drop_false_points(std::size_t begin, std::size_t& end) {
-  // Twice, since one false point beside another can hide it. Judged against the unchanged piece, dropped
-  // afterwards.
-  for (int pass = 0; pass < 2; ++pass) {
-    const auto piece = std::span<const EdgePoint>(points_).subspan(begin, end - begin);
-    std::size_t kept = begin;
-    constexpr std::size_t lag = 6;  // a point may be overwritten once no later point is judged by it
-    std::array<bool, lag> verdicts{};
-    for (std::size_t i = 0; i < piece.size() + lag; ++i) {
-      if (i >= lag) {
-        const std::size_t settled = i - lag;
-        const bool keep = !verdicts[settled % lag];
-        if (keep) points_[kept++] = points_[begin + settled];
-      }
-      if (i < piece.size()) verdicts[i % lag] = is_false_point(piece, i);
+  const auto piece = std::span<const EdgePoint>(points_).subspan(begin, end - begin);
+  std::size_t kept = begin;
+  constexpr std::size_t lag = 6;  // a point may be overwritten once no later point is judged by it
+  std::array<bool, lag> verdicts{};
+  for (std::size_t i = 0; i < piece.size() + lag; ++i) {
+    if (i >= lag) {
+      const std::size_t settled = i - lag;
+      const bool keep = !verdicts[settled % lag];
+      if (keep) points_[kept++] = points_[begin + settled];
     }
-    end = kept;
+    if (i < piece.size()) verdicts[i % lag] = is_false_point(piece, i);
   }
+  end = kept;
 }
 
 namespace {
@@ -244,14 +236,10 @@ std::size_t corner_within(std::span<const EdgePoint> part, std::size_t least,
   return 0;
 }
 
-// A piece's begin, its corners, its end.
-struct Cuts {
-  std::array<std::size_t, max_corners + 2> at{};
-  std::size_t count = 2;
-};
+}  // namespace
 
-Cuts find_corners(std::span<const EdgePoint> all, std::size_t begin, std::size_t end,
-                  const BoundaryViewSettings& settings) {
+BoundaryViewer::Cuts BoundaryViewer::find_corners(std::span<const EdgePoint> all, std::size_t begin,
+                                                  std::size_t end, const BoundaryViewSettings& settings) {
   Cuts cuts{.at = {begin, end}};
   auto& at = cuts.at;
   for (std::size_t k = 0; k + 1 < cuts.count && cuts.count < at.size();) {
@@ -286,7 +274,8 @@ Cuts find_corners(std::span<const EdgePoint> all, std::size_t begin, std::size_t
 // A stub of two or three points beyond a corner has no tangent: the side ends at the corner, and unless the
 // stub leads out of the field, the rest of the boundary hides between stripes. Says whether it hides at the
 // last, or first, end.
-bool trim_last(std::span<const EdgePoint> all, Cuts& cuts, const BoundaryViewSettings& settings) {
+bool BoundaryViewer::trim_last(std::span<const EdgePoint> all, Cuts& cuts,
+                               const BoundaryViewSettings& settings) {
   const std::size_t from = cuts.at[cuts.count - 2], end = cuts.at[cuts.count - 1];
   const std::size_t split = corner_within(all.subspan(from, end - from), 2, settings);
   if (split == 0 || end - from - split >= settings.min_side_points) {
@@ -296,7 +285,8 @@ bool trim_last(std::span<const EdgePoint> all, Cuts& cuts, const BoundaryViewSet
   return stub_hides(all[end - 1], all[end - 2], settings);
 }
 
-bool trim_first(std::span<const EdgePoint> all, Cuts& cuts, const BoundaryViewSettings& settings) {
+bool BoundaryViewer::trim_first(std::span<const EdgePoint> all, Cuts& cuts,
+                                const BoundaryViewSettings& settings) {
   const std::size_t begin = cuts.at[0], to = cuts.at[1];
   const std::size_t split = corner_within(all.subspan(begin, to - begin), 2, settings);
   if (split == 0 || split >= settings.min_side_points) {
@@ -306,14 +296,10 @@ bool trim_first(std::span<const EdgePoint> all, Cuts& cuts, const BoundaryViewSe
   return stub_hides(all[begin], all[begin + 1], settings);
 }
 
-}  // namespace
-
-// Finds the corners of one piece, cuts it half-way between them, and describes every part.
-void BoundaryViewer::describe(std::size_t begin, std::size_t end, bool hidden_first, bool hidden_last,
+// Cuts one stretch half-way between its corners and describes every part.
+void BoundaryViewer::describe(Cuts cuts, bool hidden_first, bool hidden_last,
                               const BoundaryViewSettings& settings) {
-  if (end - begin < settings.min_side_points) return;
   const std::span<const EdgePoint> all(points_);
-  Cuts cuts = find_corners(all, begin, end, settings);
   hidden_last |= trim_last(all, cuts, settings);
   hidden_first |= trim_first(all, cuts, settings);
 
@@ -365,24 +351,76 @@ void BoundaryViewer::describe_corner(std::size_t begin, std::size_t split, std::
 
 BoundaryViewer::View BoundaryViewer::look(std::span<const PlateRun> runs, std::size_t stripe_count,
                                           const BoundaryViewSettings& settings) {
-  View view;
-  collect_ends(runs);
-  points_.clear(), pieces_.clear();
-  if (ends_.empty()) return view;
-  walk_ring(view, stripe_count, settings);
-  split_into_pieces(settings);
+  begin(runs, stripe_count, settings);
+  while (!step()) {
+  }
+  return view_;
+}
 
+void BoundaryViewer::begin(std::span<const PlateRun> runs, std::size_t stripe_count,
+                           const BoundaryViewSettings& settings) {
+  settings_ = settings, stripe_count_ = stripe_count;
+  view_ = {};
+  points_.clear(), pieces_.clear(), ring_.clear();
+  next_break_ = 0;
+  collect_ends(runs);
+  stage_ = ends_.empty() ? Stage::done : Stage::take;
+  if (ends_.empty()) return;
+  walk_ring(view_, stripe_count, settings);
+  if (!ring_.empty()) open_ring();
+}
+
+bool BoundaryViewer::step() {
+  switch (stage_) {
+    case Stage::take:
+      if (ring_.empty() || next_break_ == breaks_.size()) {
+        finish();
+        stage_ = Stage::done;
+        return true;
+      }
+      take_stretch();
+      drops_done_ = 0;
+      stage_ = Stage::drop;
+      return false;
+    case Stage::drop: {
+      std::size_t end = points_.size();
+      drop_false_points(stretch_begin_, end);
+      points_.resize(end);
+      // Twice, since one false point beside another can hide it.
+      if (++drops_done_ < 2) return false;
+      const bool enough = points_.size() - stretch_begin_ >= settings_.min_side_points;
+      stage_ = enough ? Stage::find_corners : Stage::take;
+      if (!enough) ++next_break_;
+      return false;
+    }
+    case Stage::find_corners:
+      cuts_ = find_corners(points_, stretch_begin_, points_.size(), settings_);
+      stage_ = Stage::describe;
+      return false;
+    case Stage::describe: {
+      const Break& next = breaks_[(next_break_ + 1) % breaks_.size()];
+      describe(cuts_, breaks_[next_break_].starts_hidden, next.ends_hidden, settings_);
+      ++next_break_;
+      stage_ = Stage::take;
+      return false;
+    }
+    case Stage::done:
+      return true;
+  }
+  return true;
+}
+
+void BoundaryViewer::finish() {
   const auto length = [&](const BoundaryPiece& piece) {
     return (points_[piece.first + piece.count - 1].position - points_[piece.first].position).head<2>().norm();
   };
   std::sort(pieces_.begin(), pieces_.end(),
             [&](const BoundaryPiece& a, const BoundaryPiece& b) { return length(a) > length(b); });
-  view.points = points_;
-  view.pieces = pieces_;
+  view_.points = points_;
+  view_.pieces = pieces_;
   // Stripes may be missing here and there; a plate that ends inside the field leaves the outer ones empty.
-  const bool reaches_sides = !view.hidden_low_x_mm && !view.hidden_high_x_mm;
-  view.plate_fills_field = ring_.empty() && reaches_sides && ends_.size() * 10 >= stripe_count * 9;
-  return view;
+  const bool reaches_sides = !view_.hidden_low_x_mm && !view_.hidden_high_x_mm;
+  view_.plate_fills_field = ring_.empty() && reaches_sides && ends_.size() * 10 >= stripe_count_ * 9;
 }
 
 }  // namespace moldloft::geometry

@@ -15,6 +15,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
@@ -68,18 +69,37 @@ class BoundaryViewer {
   View look(std::span<const PlateRun> runs, std::size_t stripe_count,
             const BoundaryViewSettings&);  // valid until the next call
 
+  // The same in bounded pieces: begin(), step() until it says true, view(). A step goes over one piece of the
+  // boundary once.
+  void begin(std::span<const PlateRun> runs, std::size_t stripe_count, const BoundaryViewSettings&);
+  bool step();
+  const View& view() const { return view_; }
+
   std::size_t bytes() const;
 
  private:
   struct Ends;   // one stripe's lower and upper end
   struct Break;  // a place in the ring of edge points where the boundary leaves the field or hides
 
+  // A stretch of the ring's points between two breaks: where it begins, its corners, where it ends.
+  struct Cuts {
+    static constexpr std::size_t max_corners = 8;  // a plate has four
+    std::array<std::size_t, max_corners + 2> at{};
+    std::size_t count = 2;
+  };
+  enum class Stage : std::uint8_t { take, drop, find_corners, describe, done };
+
   void collect_ends(std::span<const PlateRun> runs);
   void walk_ring(View&, std::size_t stripe_count, const BoundaryViewSettings&);
-  void split_into_pieces(const BoundaryViewSettings&);
+  void open_ring();
+  void take_stretch();
   void drop_false_points(std::size_t begin, std::size_t& end);
-  void describe(std::size_t begin, std::size_t end, bool hidden_first, bool hidden_last,
-                const BoundaryViewSettings&);
+  static Cuts find_corners(std::span<const EdgePoint> all, std::size_t begin, std::size_t end,
+                           const BoundaryViewSettings&);
+  static bool trim_last(std::span<const EdgePoint> all, Cuts&, const BoundaryViewSettings&);
+  static bool trim_first(std::span<const EdgePoint> all, Cuts&, const BoundaryViewSettings&);
+  void describe(Cuts, bool hidden_first, bool hidden_last, const BoundaryViewSettings&);
+  void finish();
   void describe_side(std::size_t begin, std::size_t end, BoundaryPiece, const BoundaryViewSettings&);
   void describe_corner(std::size_t begin, std::size_t split, std::size_t end, BoundaryPiece,
                        const BoundaryViewSettings&);
@@ -88,6 +108,13 @@ class BoundaryViewer {
   std::vector<EdgePoint> ring_, points_;
   std::vector<Break> breaks_;
   std::vector<BoundaryPiece> pieces_;
+  BoundaryViewSettings settings_;
+  View view_;
+  std::size_t stripe_count_ = 0, ring_start_ = 0, next_break_ = 0;
+  std::size_t stretch_begin_ = 0;
+  int drops_done_ = 0;
+  Cuts cuts_;
+  Stage stage_ = Stage::done;
 };
 
 }  // namespace moldloft::geometry

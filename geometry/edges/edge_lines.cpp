@@ -122,9 +122,9 @@ bool is_false_point(std::span<const EdgePoint> points, std::size_t index) {
     return residual_to_neighbours({near.data(), count}, p) > false_point_mm;
   };
   const std::size_t n = points.size();
+  // Nearly every point lies on the line before it: the one behind is looked at only where it does not.
   const bool off_before = index >= 3 ? off(index - std::min<std::size_t>(index, 5), index) : off(0, 4);
-  const bool off_after = n - index > 3 ? off(index + 1, std::min(index + 6, n)) : off(n - 4, n);
-  return off_before && off_after;
+  return off_before && (n - index > 3 ? off(index + 1, std::min(index + 6, n)) : off(n - 4, n));
 }
 
 std::size_t best_split(std::span<const EdgePoint> points, std::size_t min_side) {

@@ -1,6 +1,7 @@
 #include "geometry/edges/outline.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -14,7 +15,7 @@ constexpr int most_control = most_spans + cubic;
 using SideMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_control, most_control>;
 using SideVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_control, 1>;
 
-constexpr std::size_t points_a_step = 256;
+constexpr std::size_t points_a_step = 128;
 constexpr std::uint8_t no_side = 4;
 constexpr std::size_t fewest_points = 5;  // of a side
 constexpr int rounds = 3;  // hints are off by millimetres: the third round moves corners by microns
@@ -59,6 +60,19 @@ struct OutlineBuilder::Side {
   }
 };
 
+// One reweighted least-squares pass over the points of one side, as far as it has come.
+struct OutlineBuilder::SidePass {
+  enum class Stage : std::uint8_t { add, solve, look } stage = Stage::add;
+  SideMatrix a;
+  SideVector b;
+  double zz = 0, total = 0;
+  std::size_t next = 0;  // of the side's points
+  int trial = 0;
+  double stiffness = 0, unit = 0, least = 0;
+  SideMatrix roughness;
+  SideVector best;
+};
+
 OutlineBuilder::OutlineBuilder(std::size_t max_points, const OutlineSettings& settings)
     : settings_(settings) {
   assert(settings.spans >= 1 && settings.spans <= most_spans);
@@ -67,6 +81,7 @@ OutlineBuilder::OutlineBuilder(std::size_t max_points, const OutlineSettings& se
   residual_.reserve(max_points);
   scratch_.reserve(max_points);
   sides_.resize(4);
+  side_pass_ = std::make_unique<SidePass>();
   for (PlanCurve& curve : outline_.sides) {
     curve.knots = uniform_clamped_knots(settings.spans);
     curve.control.assign(settings.spans + cubic, Eigen::Vector2d::Zero());
@@ -79,7 +94,8 @@ OutlineBuilder::OutlineBuilder(OutlineBuilder&&) noexcept = default;
 
 std::size_t OutlineBuilder::bytes() const {
   return side_of_.capacity() + order_.capacity() * sizeof(order_[0]) +
-         (residual_.capacity() + scratch_.capacity()) * sizeof(double) + sides_.capacity() * sizeof(Side);
+         (residual_.capacity() + scratch_.capacity()) * sizeof(double) + sides_.capacity() * sizeof(Side) +
+         sizeof(SidePass);
 }
 
 std::expected<void, Error> OutlineBuilder::begin(std::span<const Eigen::Vector2d> points,
@@ -107,6 +123,7 @@ std::expected<void, Error> OutlineBuilder::begin(std::span<const Eigen::Vector2d
   residual_.assign(points.size(), 0.0);
   phase_ = Phase::assign;
   round_ = 0, next_point_ = 0;
+  *side_pass_ = {};
   return {};
 }
 
@@ -208,45 +225,30 @@ SideMatrix roughness(std::span<const double> knots, int control, int order) {
   return p;
 }
 
-// Solves (A + stiffness P) c = b for the kind of roughness and the stiffness that generalized
-// cross-validation likes best: a straight or evenly bent side takes two or three degrees of freedom from its
-// noise, not seven.
-std::expected<SideVector, Error> stiffest_fair_fit(const SideMatrix& a, const SideVector& b, double zz,
-                                                   double weight, std::span<const double> knots) {
-  double least = std::numeric_limits<double>::infinity();
-  SideVector best;
-  for (const int order : {2, 3}) {
-    const SideMatrix p = roughness(knots, static_cast<int>(b.size()), order);
-    const double unit = a.trace() / p.trace();
-    for (double stiffness = 1e-7; stiffness < 1e5; stiffness *= 10) {
-      const Eigen::LLT<SideMatrix> factor(a + stiffness * unit * p);
-      if (factor.info() != Eigen::Success) continue;
-      const SideVector c = factor.solve(b);
-      const double residual = std::max(0.0, zz - 2 * c.dot(b) + c.dot(a * c));
-      const double freedom = weight - dof_inflation * factor.solve(a).trace();
-      if (freedom <= 0) continue;
-      const double score = residual / (freedom * freedom);
-      if (score < least) least = score, best = c;
-    }
-  }
-  if (best.size() == 0) return std::unexpected(Error::singular);
-  return best;
-}
+constexpr std::array<int, 2> roughness_orders{2, 3};
+constexpr int stiffnesses = 12;  // 1e-7 to 1e4, each ten times the one before
+constexpr int trials = static_cast<int>(roughness_orders.size()) * stiffnesses;
+constexpr int trials_a_step = 6;
 
 }  // namespace
 
-// One reweighted least-squares pass over the points of one side.
-std::expected<bool, Error> OutlineBuilder::fit_pass() {
-  Side& side = sides_[side_];
-  const std::vector<double>& knots = outline_.sides[0].knots;
+void OutlineBuilder::begin_pass() {
   const int n = settings_.spans + cubic;
-  const std::span<const std::uint32_t> members(order_.data() + side.begin, side.count);
-
-  SideMatrix a = SideMatrix::Zero(n, n);
-  SideVector b = SideVector::Zero(n);
-  double zz = 0, total = 0;
+  SidePass& pass = *side_pass_;
+  pass = {.a = SideMatrix::Zero(n, n), .b = SideVector::Zero(n)};
+  pass.least = std::numeric_limits<double>::infinity();
+  Side& side = sides_[side_];
   side.squares = side.weights = side.largest = 0;
-  for (const std::uint32_t i : members) {
+}
+
+// The normal equations of the next points; true when all of the side's are in.
+bool OutlineBuilder::add_points(std::span<const std::uint32_t> members) {
+  SidePass& pass = *side_pass_;
+  const Side& side = sides_[side_];
+  const std::vector<double>& knots = outline_.sides[0].knots;
+  const std::size_t end = std::min(members.size(), pass.next + points_a_step);
+  for (; pass.next < end; ++pass.next) {
+    const std::uint32_t i = members[pass.next];
     const double r = std::abs(residual_[i]), reach = tukey_reach * side.scale;
     double weight = 1;
     if (pass_ == 1) weight = side.scale / std::max(r, side.scale);
@@ -256,21 +258,86 @@ std::expected<bool, Error> OutlineBuilder::fit_pass() {
     const int k = find_span(knots, share);
     const BasisValues basis = cubic_basis(knots, k, share);
     for (int p = 0; p < 4; ++p) {
-      b[k - cubic + p] += weight * basis.value[p] * z;
-      for (int q = 0; q < 4; ++q) a(k - cubic + p, k - cubic + q) += weight * basis.value[p] * basis.value[q];
+      pass.b[k - cubic + p] += weight * basis.value[p] * z;
+      for (int q = 0; q < 4; ++q)
+        pass.a(k - cubic + p, k - cubic + q) += weight * basis.value[p] * basis.value[q];
     }
-    zz += weight * z * z, total += weight;
+    pass.zz += weight * z * z, pass.total += weight;
   }
-  if (total < fewest_points - 1.0) return std::unexpected(Error::too_few_points);
-  const auto fit = stiffest_fair_fit(a, b, zz, total, knots);
-  if (!fit) return std::unexpected(fit.error());
-  side.height = *fit;
+  return pass.next == members.size();
+}
 
-  scratch_.clear();
-  for (const std::uint32_t i : members) {
+// Solves (A + stiffness P) c = b for the kind of roughness and the stiffness that generalized
+// cross-validation likes best: a straight or evenly bent side takes two or three degrees of freedom from its
+// noise, not seven. True when all have been tried.
+bool OutlineBuilder::try_stiffnesses() {
+  SidePass& pass = *side_pass_;
+  const std::vector<double>& knots = outline_.sides[0].knots;
+  for (int tried = 0; tried < trials_a_step && pass.trial < trials;
+       ++tried, ++pass.trial, pass.stiffness *= 10) {
+    if (pass.trial % stiffnesses == 0) {
+      const int order = roughness_orders[static_cast<std::size_t>(pass.trial / stiffnesses)];
+      pass.roughness = roughness(knots, static_cast<int>(pass.b.size()), order);
+      pass.unit = pass.a.trace() / pass.roughness.trace();
+      pass.stiffness = 1e-7;
+    }
+    const Eigen::LLT<SideMatrix> factor(pass.a + pass.stiffness * pass.unit * pass.roughness);
+    if (factor.info() != Eigen::Success) continue;
+    const SideVector c = factor.solve(pass.b);
+    const double residual = std::max(0.0, pass.zz - 2 * c.dot(pass.b) + c.dot(pass.a * c));
+    const double freedom = pass.total - dof_inflation * factor.solve(pass.a).trace();
+    if (freedom <= 0) continue;
+    const double score = residual / (freedom * freedom);
+    if (score < pass.least) pass.least = score, pass.best = c;
+  }
+  return pass.trial == trials;
+}
+
+// The residuals of the next points; true when all of the side's are there.
+bool OutlineBuilder::look_at_residuals(std::span<const std::uint32_t> members) {
+  SidePass& pass = *side_pass_;
+  const Side& side = sides_[side_];
+  const std::vector<double>& knots = outline_.sides[0].knots;
+  const std::size_t end = std::min(members.size(), pass.next + points_a_step);
+  for (; pass.next < end; ++pass.next) {
+    const std::uint32_t i = members[pass.next];
     residual_[i] = side.offset_at(points_[i]) - side.height_at(knots, side.share_at(points_[i]));
     scratch_.push_back(std::abs(residual_[i]));
   }
+  return pass.next == members.size();
+}
+
+// A piece of one pass; true when it was the side's last pass and is done.
+std::expected<bool, Error> OutlineBuilder::fit_pass() {
+  Side& side = sides_[side_];
+  SidePass& pass = *side_pass_;
+  const std::span<const std::uint32_t> members(order_.data() + side.begin, side.count);
+  switch (pass.stage) {
+    case SidePass::Stage::add:
+      if (pass.next == 0) begin_pass();
+      if (!add_points(members)) return false;
+      if (pass.total < fewest_points - 1.0) return std::unexpected(Error::too_few_points);
+      pass.stage = SidePass::Stage::solve;
+      return false;
+    case SidePass::Stage::solve:
+      if (!try_stiffnesses()) return false;
+      if (pass.best.size() == 0) return std::unexpected(Error::singular);
+      side.height = pass.best;
+      scratch_.clear();
+      pass.next = 0;
+      pass.stage = SidePass::Stage::look;
+      return false;
+    case SidePass::Stage::look:
+      if (!look_at_residuals(members)) return false;
+      pass.next = 0;
+      pass.stage = SidePass::Stage::add;
+      return end_pass(members);
+  }
+  return false;
+}
+
+bool OutlineBuilder::end_pass(std::span<const std::uint32_t> members) {
+  Side& side = sides_[side_];
   std::nth_element(scratch_.begin(), scratch_.begin() + scratch_.size() / 2, scratch_.end());
   // A side of nearly perfect points must not turn its smallest residuals into outliers.
   side.scale = std::max(1.4826 * scratch_[scratch_.size() / 2], 0.3 * settings_.noise_mm);

@@ -6,8 +6,8 @@
 // neighbouring sides are extended to meet, and the meeting point is the corner.
 //
 // Frame        world, plan view (x, y), mm
-// Work         step() does one bounded piece (one pass over one side's points); the caller decides how many a
-//              tick
+// Work         step() does one bounded piece (128 points, or six trial solutions of one side); the caller decides
+//              how many a tick
 // Allocation   in the constructor only
 // Failure      Error::not_four_sided (hints), too_few_points (in all, or a side without points), not_finite,
 //              collinear (hints that span no area or go clockwise, sides that do not meet), capacity
@@ -17,6 +17,7 @@
 #include <array>
 #include <cstdint>
 #include <expected>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -55,11 +56,17 @@ class OutlineBuilder {
 
  private:
   struct Side;
+  struct SidePass;
   enum class Phase : std::uint8_t { idle, assign, sort, fit, corners, finish, done };
 
   void assign_chunk();
   std::expected<void, Error> sort_by_side();
   std::expected<bool, Error> fit_pass();  // true when the side at hand is done
+  void begin_pass();
+  bool add_points(std::span<const std::uint32_t> members);
+  bool try_stiffnesses();
+  bool look_at_residuals(std::span<const std::uint32_t> members);
+  bool end_pass(std::span<const std::uint32_t> members);
   std::expected<void, Error> meet_corners();
   void finish();
 
@@ -70,6 +77,7 @@ class OutlineBuilder {
   std::vector<std::uint32_t> order_;   // points side by side
   std::vector<double> residual_, scratch_;
   std::vector<Side> sides_;  // four
+  std::unique_ptr<SidePass> side_pass_;
   Phase phase_ = Phase::idle;
   std::size_t next_point_ = 0;
   int round_ = 0, side_ = 0, pass_ = 0;

@@ -23,6 +23,8 @@ constexpr std::size_t trim_points = 3;   // as many points as a side wall leaves
 // Runs a stripe may hold on average: a field of 102 mm holds 34 of the shortest.
 constexpr std::size_t runs_per_stripe = 40;
 constexpr std::size_t stripes_in_turn = 2;
+constexpr std::uint32_t farthest_link =
+    3;  // stripes ahead: two may be missing between two runs of one region
 
 // The usual distance between neighbouring points near one end of a run, where perspective may have stretched
 // it.
@@ -203,7 +205,9 @@ std::uint32_t PlateRunFinder::region_of(std::uint32_t run) const {
 
 // Runs on neighbouring stripes belong together where they lie side by side at heights that a sloping plate
 // allows. A stripe that is missing, or has no run there, is looked across as a drop-out would be.
-void PlateRunFinder::link_stripes(std::span<const StripeView> stripes, const PlateRunSettings& settings) {
+void PlateRunFinder::link_run(std::uint32_t i, const PlateRunSettings& settings) {
+  const std::size_t next = runs_[i].stripe + links_ahead_;
+  if (runs_[i].linked_forward || next >= stripes_.size()) return;
   const auto points_of = [&](const Run& run) {
     return std::span<const std::uint32_t>(good_).subspan(run.begin, run.count);
   };
@@ -213,8 +217,8 @@ void PlateRunFinder::link_stripes(std::span<const StripeView> stripes, const Pla
     int agree = 0;
     for (const double share : {0.15, 0.5, 0.85}) {
       const double y = from + share * (to - from);
-      const StripeLine here = line_about(stripes[a.stripe], points_of(a), y, 4);
-      const StripeLine there = line_about(stripes[b.stripe], points_of(b), y, 4);
+      const StripeLine here = line_about(stripes_[a.stripe], points_of(a), y, 4);
+      const StripeLine there = line_about(stripes_[b.stripe], points_of(b), y, 4);
       const double dx = std::abs(there.x_at(y) - here.x_at(y));
       const bool near = b.stripe == a.stripe + 1 || dx <= settings.bridge_mm;
       agree +=
@@ -223,45 +227,37 @@ void PlateRunFinder::link_stripes(std::span<const StripeView> stripes, const Pla
     return agree >= 2;
   };
 
-  for (int ahead = 1; ahead <= 3; ++ahead) {
-    for (std::uint32_t i = 0; i < runs_.size(); ++i) {
-      const std::size_t next = runs_[i].stripe + ahead;
-      if (runs_[i].linked_forward || next >= stripes.size()) continue;
-      for (std::uint32_t j = first_run_[next]; j < first_run_[next + 1]; ++j) {
-        if (!continues(runs_[i], runs_[j])) continue;
-        runs_[i].linked_forward = true;
-        const std::uint32_t a = region_of(i), b = region_of(j);
-        runs_[std::max(a, b)].parent = std::min(a, b);
-      }
-    }
-    // Short paths: a parent never lies behind its child, so one pass in order flattens every tree.
-    for (Run& run : runs_) run.parent = runs_[run.parent].parent;
+  for (std::uint32_t j = first_run_[next]; j < first_run_[next + 1]; ++j) {
+    if (!continues(runs_[i], runs_[j])) continue;
+    runs_[i].linked_forward = true;
+    const std::uint32_t a = region_of(i), b = region_of(j);
+    runs_[std::max(a, b)].parent = std::min(a, b);
   }
 }
 
-std::size_t PlateRunFinder::nearest_run(std::span<const StripeView> stripes, const Eigen::Vector3d& hint,
-                                        double reach_mm) const {
-  std::size_t nearest = runs_.size();
-  double least = reach_mm;
-  for (std::size_t i = 0; i < runs_.size(); ++i) {
-    const Run& run = runs_[i];
-    const double y = std::clamp(hint.y(), run.y_first, run.y_last);
-    const auto good = std::span<const std::uint32_t>(good_).subspan(run.begin, run.count);
-    const StripeLine line = line_about(stripes[run.stripe], good, y, 4);
-    const double distance = (Eigen::Vector3d(line.x_at(y), y, line.z_at(y)) - hint).norm();
-    if (distance < least) least = distance, nearest = i;
-  }
-  return nearest;
+// Short paths: a parent never lies behind its child, so one pass in order flattens every tree.
+void PlateRunFinder::flatten_regions() {
+  for (Run& run : runs_) run.parent = runs_[run.parent].parent;
+}
+
+void PlateRunFinder::compare_with(const Eigen::Vector3d& hint, std::uint32_t i) {
+  const Run& run = runs_[i];
+  const double y = std::clamp(hint.y(), run.y_first, run.y_last);
+  const auto good = std::span<const std::uint32_t>(good_).subspan(run.begin, run.count);
+  const StripeLine line = line_about(stripes_[run.stripe], good, y, 4);
+  const double distance = (Eigen::Vector3d(line.x_at(y), y, line.z_at(y)) - hint).norm();
+  if (distance < least_) least_ = distance, nearest_ = i;
 }
 
 namespace {
 
 // Where the run leaves the plate: half a spacing beyond its last good point, on the line through the last
 // points. The true edge lies anywhere between the last point and the one that would have followed.
-Eigen::Vector3d edge_beyond(const StripeView& stripe, std::span<const std::uint32_t> good, bool at_last) {
+Eigen::Vector3d edge_beyond(const StripeView& stripe, std::span<const std::uint32_t> good, bool at_last,
+                            double spacing) {
   const std::size_t n = std::min(good.size(), line_points);
   const StripeLine line = fit_line(stripe, at_last ? good.last(n) : good.first(n));
-  const double half = 0.5 * spacing_near_end(stripe, good, at_last);
+  const double half = 0.5 * spacing;
   const double y = at_last ? stripe.y[good.back()] + half : stripe.y[good.front()] - half;
   return {line.x_at(y), y, line.z_at(y)};
 }
@@ -296,7 +292,9 @@ std::expected<std::span<const PlateRun>, Error> PlateRunFinder::find(std::span<c
                                                                      const PlateRunSettings& settings) {
   if (const auto begun = begin(stripes); !begun) return std::unexpected(begun.error());
   if (const auto cut = cut_stripes(stripes.size(), settings); !cut) return std::unexpected(cut.error());
-  return finish(hint, settings);
+  if (const auto found = find_plate(std::numeric_limits<std::size_t>::max(), hint, settings); !found)
+    return std::unexpected(found.error());
+  return plate_runs();
 }
 
 std::expected<void, Error> PlateRunFinder::begin(std::span<const StripeView> stripes) {
@@ -309,7 +307,8 @@ std::expected<void, Error> PlateRunFinder::begin(std::span<const StripeView> str
 
   good_.clear(), runs_.clear(), first_run_.clear(), found_.clear();
   stripes_ = stripes;
-  next_stripe_ = 0;
+  next_stripe_ = 0, next_run_ = 0;
+  stage_ = Stage::link, links_ahead_ = 1;
   return {};
 }
 
@@ -323,50 +322,81 @@ std::expected<bool, Error> PlateRunFinder::cut_stripes(std::size_t at_most,
   return next_stripe_ == stripes_.size();
 }
 
-std::expected<std::span<const PlateRun>, Error> PlateRunFinder::finish(const Eigen::Vector3d& hint,
-                                                                       const PlateRunSettings& settings) {
+std::expected<bool, Error> PlateRunFinder::find_plate(std::size_t at_most_runs, const Eigen::Vector3d& hint,
+                                                      const PlateRunSettings& settings) {
   if (!hint.allFinite()) return std::unexpected(Error::not_finite);
-  const std::span<const StripeView> stripes = stripes_;
-  first_run_.push_back(static_cast<std::uint32_t>(runs_.size()));
-  link_stripes(stripes, settings);
-
-  const std::size_t seed = nearest_run(stripes, hint, settings.hint_reach_mm);
-  if (seed == runs_.size()) return std::unexpected(Error::not_on_plate);
-  const std::uint32_t plate = region_of(static_cast<std::uint32_t>(seed));
-
-  for (std::uint32_t i = 0; i < runs_.size(); ++i) {
-    if (region_of(i) != plate) continue;
-    const Run& run = runs_[i];
-    const StripeView& stripe = stripes[run.stripe];
-    const auto good = std::span<const std::uint32_t>(good_).subspan(run.begin, run.count);
-    PlateRun out;
-    out.stripe = run.stripe, out.first = good.front(), out.last = good.back();
-    out.edge_first = edge_beyond(stripe, good, false);
-    out.edge_last = edge_beyond(stripe, good, true);
-
-    const auto neighbour = [&](std::uint32_t j, bool above) {
-      const Run& other = runs_[j];
-      const auto theirs = std::span<const std::uint32_t>(good_).subspan(other.begin, other.count);
-      const std::size_t n = std::min(good.size(), line_points), m = std::min(theirs.size(), line_points);
-      const StripeLine line = fit_line(stripe, above ? good.last(n) : good.first(n));
-      const StripeLine far = fit_line(stripe, above ? theirs.first(m) : theirs.last(m));
-      const double gap = above ? other.y_first - run.y_last : run.y_first - other.y_last;
-      const double y = above ? other.y_first : other.y_last;
-      return Neighbour{true, gap, far.z_at(y) - line.z_at(y)};
-    };
-    const bool below = i > first_run_[run.stripe], above = i + 1 < first_run_[run.stripe + 1u];
-    const std::size_t rays_above = stripe.z.size() - 1 - out.last;
-    const bool low_limit =
-        at_field_limit(-run.y_first, out.first, spacing_near_end(stripe, good, false), settings);
-    const bool high_limit =
-        at_field_limit(run.y_last, rays_above, spacing_near_end(stripe, good, true), settings);
-    out.at_first = low_limit ? RunEnd::field_limit
-                             : kind_of_end(below ? neighbour(i - 1, false) : Neighbour{}, settings);
-    out.at_last = high_limit ? RunEnd::field_limit
-                             : kind_of_end(above ? neighbour(i + 1, true) : Neighbour{}, settings);
-    found_.push_back(out);
+  // One past the last stripe's runs.
+  if (first_run_.size() == stripes_.size()) first_run_.push_back(static_cast<std::uint32_t>(runs_.size()));
+  while (true) {
+    for (; next_run_ < runs_.size() && at_most_runs > 0; ++next_run_, --at_most_runs) {
+      switch (stage_) {
+        case Stage::link:
+          link_run(next_run_, settings);
+          break;
+        case Stage::seek_hint:
+          if (next_run_ == 0)
+            least_ = settings.hint_reach_mm, nearest_ = static_cast<std::uint32_t>(runs_.size());
+          compare_with(hint, next_run_);
+          break;
+        case Stage::describe:
+          if (region_of(next_run_) == nearest_) found_.push_back(described(next_run_, settings));
+          break;
+      }
+    }
+    if (next_run_ < runs_.size()) return false;
+    if (const auto ended = end_stage(); !ended || *ended) return ended;
   }
-  return std::span<const PlateRun>(found_);
+}
+
+// All runs have been through the stage; says whether it was the last.
+std::expected<bool, Error> PlateRunFinder::end_stage() {
+  switch (stage_) {
+    case Stage::link:
+      flatten_regions();
+      if (++links_ahead_ > farthest_link) stage_ = Stage::seek_hint;
+      break;
+    case Stage::seek_hint:
+      if (runs_.empty() || nearest_ == runs_.size()) return std::unexpected(Error::not_on_plate);
+      nearest_ = region_of(nearest_);
+      stage_ = Stage::describe;
+      break;
+    case Stage::describe:
+      return true;
+  }
+  next_run_ = 0;
+  return false;
+}
+
+PlateRun PlateRunFinder::described(std::uint32_t i, const PlateRunSettings& settings) const {
+  const Run& run = runs_[i];
+  const StripeView& stripe = stripes_[run.stripe];
+  const auto good = std::span<const std::uint32_t>(good_).subspan(run.begin, run.count);
+  PlateRun out;
+  out.stripe = run.stripe, out.first = good.front(), out.last = good.back();
+  const double spacing_first = spacing_near_end(stripe, good, false),
+               spacing_last = spacing_near_end(stripe, good, true);
+  out.edge_first = edge_beyond(stripe, good, false, spacing_first);
+  out.edge_last = edge_beyond(stripe, good, true, spacing_last);
+
+  const auto neighbour = [&](std::uint32_t j, bool above) {
+    const Run& other = runs_[j];
+    const auto theirs = std::span<const std::uint32_t>(good_).subspan(other.begin, other.count);
+    const std::size_t n = std::min(good.size(), line_points), m = std::min(theirs.size(), line_points);
+    const StripeLine line = fit_line(stripe, above ? good.last(n) : good.first(n));
+    const StripeLine far = fit_line(stripe, above ? theirs.first(m) : theirs.last(m));
+    const double gap = above ? other.y_first - run.y_last : run.y_first - other.y_last;
+    const double y = above ? other.y_first : other.y_last;
+    return Neighbour{true, gap, far.z_at(y) - line.z_at(y)};
+  };
+  const bool below = i > first_run_[run.stripe], above = i + 1 < first_run_[run.stripe + 1u];
+  const std::size_t rays_above = stripe.z.size() - 1 - out.last;
+  const bool low_limit = at_field_limit(-run.y_first, out.first, spacing_first, settings);
+  const bool high_limit = at_field_limit(run.y_last, rays_above, spacing_last, settings);
+  out.at_first =
+      low_limit ? RunEnd::field_limit : kind_of_end(below ? neighbour(i - 1, false) : Neighbour{}, settings);
+  out.at_last =
+      high_limit ? RunEnd::field_limit : kind_of_end(above ? neighbour(i + 1, true) : Neighbour{}, settings);
+  return out;
 }
 
 }  // namespace moldloft::geometry

@@ -71,27 +71,35 @@ class PlateRunFinder {
                                                        const Eigen::Vector3d& hint,
                                                        const PlateRunSettings& settings);
 
-  // The same in bounded pieces: begin(), cut_stripes() until it says true (4 us a stripe), finish(). The
-  // stripes are the caller's and must stay until then.
+  // The same in bounded pieces: begin(), cut_stripes() until it says true (4 us a stripe), then find_plate() until
+  // it says true (0.2 us a run), plate_runs(). The stripes are the caller's and must stay until then.
   std::expected<void, Error> begin(std::span<const StripeView> stripes);
   std::expected<bool, Error> cut_stripes(std::size_t at_most, const PlateRunSettings& settings);
-  std::expected<std::span<const PlateRun>, Error> finish(const Eigen::Vector3d& hint,
-                                                         const PlateRunSettings& settings);
+  std::expected<bool, Error> find_plate(std::size_t at_most_runs, const Eigen::Vector3d& hint,
+                                        const PlateRunSettings& settings);
+  std::span<const PlateRun> plate_runs() const { return found_; }
 
   std::size_t bytes() const;
 
  private:
   std::span<const StripeView> stripes_;  // of the frame at hand
   std::size_t next_stripe_ = 0;
-  struct Run;  // a stretch of good points on one stripe, linked into its region
+  enum class Stage : std::uint8_t { link, seek_hint, describe };
+  Stage stage_ = Stage::link;
+  std::uint32_t next_run_ = 0, links_ahead_ = 1, nearest_ = 0;
+  double least_ = 0;  // distance of the hint to the nearest run so far
+  struct Run;         // a stretch of good points on one stripe, linked into its region
 
   bool cut_in_turn(std::size_t count, const PlateRunSettings&);  // false when there are too many runs
   void join_pieces(const StripeView&, const PlateRunSettings&);
   void drop_short_pieces(const StripeView&, std::size_t min_points, double min_length_mm);
   void trim_ends(const StripeView&, const PlateRunSettings&);
   bool keep_runs(std::uint16_t stripe, const StripeView&, const PlateRunSettings&);
-  void link_stripes(std::span<const StripeView>, const PlateRunSettings&);
-  std::size_t nearest_run(std::span<const StripeView>, const Eigen::Vector3d& hint, double reach_mm) const;
+  void link_run(std::uint32_t run, const PlateRunSettings&);
+  void flatten_regions();
+  void compare_with(const Eigen::Vector3d& hint, std::uint32_t run);
+  PlateRun described(std::uint32_t run, const PlateRunSettings&) const;
+  std::expected<bool, Error> end_stage();
   std::uint32_t region_of(std::uint32_t run) const;
 
   std::vector<std::uint32_t> good_;  // indices of good points, stripe after stripe; runs are stretches of it

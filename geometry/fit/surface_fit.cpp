@@ -16,8 +16,8 @@ namespace {
 
 constexpr int fewest_spans = 4;  // of a side as well: the nets must refine the sides' knots
 
-// Multiply-adds, about: of a cell from four, and of a shot's cell into a coarser one.
-constexpr double merge_cost = 2000, restrict_cost = 200;
+// Multiply-adds, about: of a cell from four, of a shot's cell into a coarser one, and of a cell's weight.
+constexpr double merge_cost = 2000, restrict_cost = 200, total_cost = 100;
 
 // A net is tried when it has at least this many points for every unknown.
 constexpr double points_an_unknown = 4;
@@ -53,7 +53,7 @@ std::size_t shot_cells_planned(const SurfaceFitSettings& settings) {
 }  // namespace
 
 struct SurfaceFit::Work {
-  enum class Phase { adding, merge, solve, compare, finish, done, failed };
+  enum class Phase { adding, total, merge, solve, compare, finish, done, failed };
 
   explicit Work(const SurfaceFitSettings& s)
       : settings(s),
@@ -68,7 +68,7 @@ struct SurfaceFit::Work {
   }
 
   void fold(int of_shot);
-  void take_totals();
+  bool total_some();
   void start_level();
   std::expected<bool, Error> piece();
   bool merge_some();
@@ -174,7 +174,7 @@ std::expected<void, Error> SurfaceFit::add(std::span<const Eigen::Vector3d> worl
 void SurfaceFit::start_solving() {
   Work& work = *work_;
   work.shots.finish_adding();
-  work.take_totals();
+  work.totals.weight = work.totals.squares = 0;
   work.report.points_used = work.totals.points;
   work.level = 0, work.row = work.shot = 0, work.shot_cell = 0;
   work.best_score = std::numeric_limits<double>::infinity();
@@ -191,21 +191,24 @@ void SurfaceFit::start_solving() {
     work.phase = Work::Phase::failed;
     return;
   }
-  if (work.first_level == 0) {
-    work.start_level();
-  } else {
-    work.level = 1, work.phase = Work::Phase::merge;
-  }
+  work.phase = Work::Phase::total;
 }
 
-void SurfaceFit::Work::take_totals() {
-  totals.weight = totals.squares = 0;
-  for (int i = 0; i < moments.front().cells_u(); ++i) {
-    for (int j = 0; j < moments.front().cells_v(); ++j) {
-      totals.weight += moments.front().cell(i, j).weight();
-      totals.squares += moments.front().cell(i, j).squares();
+// What all cells hold together, row by row; true when the last is in.
+bool SurfaceFit::Work::total_some() {
+  const MomentGrid& grid = moments.front();
+  const double row_cost = total_cost * grid.cells_v();
+  while (row < grid.cells_u()) {
+    if (work > 0 && work + row_cost > NetSolver::work_a_step) return false;
+    for (int j = 0; j < grid.cells_v(); ++j) {
+      totals.weight += grid.cell(row, j).weight();
+      totals.squares += grid.cell(row, j).squares();
     }
+    ++row;
+    work += row_cost;
   }
+  row = 0;
+  return true;
 }
 
 void SurfaceFit::Work::start_level() {
@@ -290,6 +293,15 @@ std::expected<bool, Error> SurfaceFit::Work::piece() {
       return std::unexpected(error);
     case Phase::done:
       return true;
+    case Phase::total:
+      full = !total_some();
+      if (full) return false;
+      if (first_level == 0) {
+        start_level();
+      } else {
+        level = 1, phase = Phase::merge;
+      }
+      return false;
     case Phase::merge:
       full = !merge_some();
       if (full) return false;
@@ -325,7 +337,9 @@ std::expected<bool, Error> SurfaceFit::Work::piece() {
 double SurfaceFit::progress() const {
   const Work& work = *work_;
   if (work.phase == Work::Phase::done) return 1;
-  if (work.phase == Work::Phase::adding || work.phase == Work::Phase::failed) return 0;
+  if (work.phase == Work::Phase::adding || work.phase == Work::Phase::total ||
+      work.phase == Work::Phase::failed)
+    return 0;
   // A net costs unknowns^2, near enough: sixteen times the next one.
   double all = 0, done = 0;
   for (std::size_t k = 0; k < work.levels.size(); ++k) {

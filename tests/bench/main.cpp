@@ -16,6 +16,7 @@ Json run_edges(const Options&);
 Json run_fit(const Options&);
 Json run_localize(const Options&);
 Json run_project(const Options&);
+Json run_scheduler(const Options&);
 Json run_thesis(const Options&);
 
 std::span<const Benchmark> all_benchmarks() {
@@ -25,6 +26,7 @@ std::span<const Benchmark> all_benchmarks() {
       {"localize", "poses of measured points, and their deviations", run_localize},
       {"curvature", "curvature maps, contours, and the fit whose parameters are not known", run_curvature},
       {"edges", "the plate's edge in one shot", run_edges},
+      {"scheduler", "what a tick costs beside its tasks", run_scheduler},
       {"thesis", "chapter 6 of the thesis again: wave, hood, fuselage, plate, tables 6.1 to 6.3", run_thesis},
   };
   return all;

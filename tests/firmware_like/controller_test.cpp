@@ -4,6 +4,9 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <utility>
+
 #include "firmware_like/results.hpp"
 #include "firmware_like/run_command.hpp"
 #include "hal/cable.hpp"
@@ -82,4 +85,52 @@ TEST_CASE("the timing report names every row of the task table") {
   CHECK(t["tick_us"] == 1000.0);
   CHECK(t["tasks"][0]["runs"] == 290);  // without the ten of the warm-up
   CHECK(t["background"][0]["name"] == "surface");
+}
+
+namespace {
+
+// Virtual time that oversleeps once, by so much.
+class StallingClock final : public hal::Clock {
+ public:
+  hal::Instant now() noexcept override { return now_; }
+  void sleep_until(hal::Instant wake) noexcept override {
+    now_ = std::max(now_, wake) + std::exchange(stall, hal::Duration{0});
+  }
+  hal::Duration stall{0};
+
+ private:
+  hal::Instant now_{0};
+};
+
+}  // namespace
+
+TEST_CASE(
+    "a missed tick aborts the cell where the configuration says so, and freezes the flight recorder either "
+    "way") {
+  for (const bool stop : {false, true}) {
+    CAPTURE(stop);
+    StallingClock clock;
+    hal::Cable scanner{clock, {}}, robot{clock, {}};
+    auto config = default_config();
+    if (stop) config.missed_ticks = tasks::MissedTickPolicy::stop;
+    const auto controller = std::make_unique<Controller>(config, clock, scanner.host(), robot.host());
+    controller->start();
+    for (int i = 0; i < 20; ++i) REQUIRE(controller->tick());
+    CHECK_FALSE(controller->flight().due());
+    clock.stall = 3500us;
+    controller->tick();
+    CHECK(controller->scheduler().missed_ticks() == 3);
+    CHECK(controller->flight().due());
+    for (int i = 0; i < 25 && controller->tick(); ++i) {
+    }
+    if (!stop) {
+      CHECK(controller->flight().frozen());
+      CHECK(controller->cell().state() == tasks::CellState::starting);
+    } else {
+      CHECK(exit_code(*controller) == exit_aborted);
+      CHECK(controller->cell().why().view() ==
+            "3 ticks missed at 0.024 s, woken late (none), and missed_ticks is \"stop\": clear when the cell "
+            "is safe");
+    }
+  }
 }

@@ -1,6 +1,7 @@
 #include "firmware_like/memory_plan.hpp"
 
 #include <doctest/doctest.h>
+#include <malloc.h>
 
 #include <map>
 
@@ -46,6 +47,24 @@ TEST_CASE("no subsystem has used more than its plan, and each is named once") {
     CHECK(++names[item.subsystem] == 1);
   }
   CHECK(names.size() >= 6);
+}
+
+TEST_CASE("the plan is what the controller takes: nothing of its heap is missing in it") {
+  for (const char* more :
+       {"", "[plate]\nlargest_mm = [1500, 700]", "[scanner]\nmax_points_per_stripe = 1000"}) {
+    CAPTURE(more);
+    const auto config = parse_config("schema = 1\n" + std::string{more}, "cell.toml");
+    REQUIRE(config.has_value());
+    hal::VirtualClock clock;
+    hal::Cable scanner{clock, {}}, robot{clock, {}};
+    const auto taken = [] { return ::mallinfo2().uordblks + ::mallinfo2().hblkhd; };
+    const std::size_t before = taken();
+    const auto controller = std::make_unique<Controller>(*config, clock, scanner.host(), robot.host());
+    const auto heap = static_cast<double>(taken() - before);
+    if (heap == 0) return;  // under a sanitizer's allocator glibc knows nothing
+    // What rounding of blocks and the controller's own small members add.
+    CHECK(static_cast<double>(total_plan(controller->memory())) == doctest::Approx(heap).epsilon(0.01));
+  }
 }
 
 TEST_CASE("a larger plate asks for more, frame by frame, edge by edge, span by span") {

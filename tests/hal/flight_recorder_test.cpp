@@ -129,6 +129,19 @@ TEST_CASE("while one trigger is worked on others only count, and after the last 
   CHECK_FALSE(flight.due());
 }
 
+TEST_CASE("a request from another thread triggers at the next tick") {
+  FlightRecorder flight{{.events = 64, .transitions = 4, .ticks_after = 0, .dumps = 2}};
+  flight.request();
+  CHECK_FALSE(flight.due());
+  flight.tick(5ms, 0us, 5);
+  CHECK(flight.frozen());
+  CHECK(dumped(flight).header.cause == FlightCause::request);
+  CHECK(dumped(flight).name_of(dumped(flight).header.task) == "none");
+  flight.thaw();
+  flight.tick(6ms, 0us, 6);
+  CHECK_FALSE(flight.due());  // once
+}
+
 TEST_CASE("a value beyond 4.29 seconds stands as the largest, never as a small one") {
   FlightRecorder flight{{.events = 4, .transitions = 1}};
   flight.note(FlightKind::task, 0, 1ms, 5s);

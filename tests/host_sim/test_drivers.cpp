@@ -71,6 +71,7 @@ TEST_CASE("the controller's drivers bring the scanner over the plate and get a f
 
   // Every point, carried into the plate's frame by the true pose, lies on its surface but for the noise.
   const auto& frame = bench.scanner.frame();
+  REQUIRE(bench.scanner.unpack(frame.point_count));
   const auto plate_from_scanner = bench.world.plate().world_from_plate().inverse() * from;
   int seen = 0, near = 0;
   for (std::uint32_t k = 0; k < frame.point_count; ++k) {

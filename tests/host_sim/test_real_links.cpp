@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "firmware_like/flight_files.hpp"
 #include "firmware_like/run_command.hpp"
 #include "hal/run_store.hpp"
 #include "host_sim/child_process.hpp"
@@ -199,4 +200,44 @@ TEST_CASE(
   CHECK(lines_in(refused.err()) == 1);
   CHECK(refused.err().starts_with("moldloft: target outside the workspace: x "));
   CHECK_FALSE(std::filesystem::exists(never));
+}
+
+TEST_CASE("a run that is asked for it, then dies, leaves its last second twice, and replay shows both") {
+  const Devices devices;
+  const hal::TemporaryFolder folder;
+  const std::string out = folder.file("run");
+  {
+    ChildProcess run{run_words(devices, out), PTY_MODEM};
+    REQUIRE_MESSAGE(run.prints("boundary shots   3", run_limit), run.err());
+    run.send(SIGUSR2);
+    hal::SteadyClock clock;
+    // A busy machine may have frozen the recorder for an overrun of its own before: the request counts then.
+    const auto end = clock.now() + 20s;
+    while (firmware_like::flight_dumps(out).empty() && clock.now() < end)
+      clock.sleep_until(clock.now() + 10ms);
+    run.send(SIGSEGV);
+    CHECK_FALSE(run.wait(20s).has_value());
+    CHECK(run.err().find("moldloft: crashed; flight-crash.bin in the run's folder") != std::string::npos);
+  }
+  CHECK(std::filesystem::exists(out + "/flight-01.bin"));
+  REQUIRE(std::filesystem::exists(out + "/flight-crash.bin"));
+  const auto shown = run_program({MOLDLOFT, "replay", out, "--timeline"});
+  CHECK(shown.exit_code == 0);
+  CHECK(shown.out.find("/flight-01.bin\ncause: ") != std::string::npos);
+  CHECK(shown.out.find("/flight-crash.bin\ncause: signal 11, running task: ") != std::string::npos);
+  CHECK(shown.out.find(
+            "tasks:  1 scanner in  2 robot in  3 cell  4 robot out  5 scanner out  6 health  ~ surface\n") !=
+        std::string::npos);
+  CHECK(shown.out.find("ticks of 1000 us") != std::string::npos);
+  CHECK(shown.out.find("[shot: ") != std::string::npos);
+  CHECK(shown.out.find("scanner ") != std::string::npos);
+
+  const auto events = run_program({MOLDLOFT, "replay", out});
+  CHECK(events.exit_code == 0);
+  CHECK(events.out.find("cell     start            idle -> starting\n") != std::string::npos);
+  CHECK(events.out.find("frame    boundary at x ") != std::string::npos);
+
+  const auto nothing = run_program({MOLDLOFT, "replay", folder.file("none"), "--timeline"});
+  CHECK(nothing.exit_code == 1);
+  CHECK(nothing.err == "moldloft: " + folder.file("none") + ": no such run or dump\n");
 }

@@ -3,6 +3,7 @@
 
 #include "firmware_like/export_command.hpp"
 #include "firmware_like/run_command.hpp"
+#include "host_sim/day.hpp"
 #include "host_sim/scripted_run.hpp"
 
 using namespace moldloft;
@@ -137,4 +138,29 @@ TEST_CASE("a finished run that is resumed is fitted again, and the arm goes nowh
   CHECK(cell.motions == 0);
   CHECK(cell.exposures == 0);
   CHECK(cell.file("surface.json") == surface);
+}
+
+TEST_CASE(
+    "plate after plate under one controller: memory and handles stay, nothing is lost, ticks keep their "
+    "beat") {
+  DayOptions options;
+  options.hours = 4 * 25.0 / 3600;
+  options.every_s = 25;
+  options.rows = 4;
+  const auto day = run_day(options);
+  REQUIRE_MESSAGE(day.has_value(), day.error().what);
+  REQUIRE(day->rows.size() == 4);
+  for (std::size_t i = 0; i < day->rows.size(); ++i) {
+    const DayRow& row = day->rows[i];
+    CHECK(row.plates == i + 1);
+    CHECK(row.off_beat_ns == 0);
+    CHECK(row.missed == 0);
+    CHECK(row.recorder_lost == 0);
+    CHECK(row.handles == day->rows[0].handles);
+    CHECK(row.threads == 1);
+    CHECK(row.worst_normal_mm <= 0.08);
+  }
+  CHECK(day->rows.back().ticks == 4 * 25 * 1000 + 4);  // a tick more a plate, which begins at the next
+  CHECK(day->rows.back().shots == 4 * day->rows.front().shots);
+  CHECK(day->flat);
 }

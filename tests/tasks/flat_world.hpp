@@ -58,7 +58,7 @@ inline Walk walk_round(BoundaryTracker& tracker, const FlatWorld& world, const S
     const auto motion = geometry::turned_about_z(place.head_yaw, place.centre);
     world.expose(motion, frame);
     const bool seeking = tracker.state() == TrackState::seek_edge;
-    view.begin(frame, motion.inverse() * tracker.plate_hint(), seeking ? 60 : 18);
+    view.begin(frame, {.hint = motion.inverse() * tracker.plate_hint(), .reach_mm = seeking ? 60.0 : 18.0});
     while (!view.step()) {
     }
     // Without a table height to tell them apart the higher of the two levels is the plate.

@@ -239,15 +239,15 @@ TEST_CASE("a frame cut in any portions, stripes of unequal length included, give
   for (const std::size_t portion : {1, 2, 3, 7}) {
     REQUIRE(finder.begin(frame.views).has_value());
     for (bool done = false; !done;) done = finder.cut_stripes(portion, {}).value();
-    const auto runs = finder.finish({0, -20, 0}, {});
-    REQUIRE(runs.has_value());
-    REQUIRE(runs->size() == truth.size());
+    for (bool done = false; !done;) done = finder.find_plate(3 * portion, {0, -20, 0}, {}).value();
+    const auto runs = finder.plate_runs();
+    REQUIRE(runs.size() == truth.size());
     for (std::size_t k = 0; k < truth.size(); ++k) {
-      CHECK((*runs)[k].stripe == truth[k].stripe);
-      CHECK((*runs)[k].first == truth[k].first);
-      CHECK((*runs)[k].last == truth[k].last);
-      CHECK((*runs)[k].edge_first == truth[k].edge_first);
-      CHECK((*runs)[k].edge_last == truth[k].edge_last);
+      CHECK(runs[k].stripe == truth[k].stripe);
+      CHECK(runs[k].first == truth[k].first);
+      CHECK(runs[k].last == truth[k].last);
+      CHECK(runs[k].edge_first == truth[k].edge_first);
+      CHECK(runs[k].edge_last == truth[k].edge_last);
     }
   }
 }
