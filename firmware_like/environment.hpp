@@ -46,8 +46,8 @@ struct Verdict {
   std::string why() const;           // in one line; empty when representative
 };
 
-// Representative: the figures say what the program does on a machine of the kind that it is meant for. A virtual machine
-// never is: its processors are taken away from it without its knowing.
+// Representative: the figures say what the program does on a machine of the kind that it is meant for. A virtual
+// machine never is: its processors are taken away from it without its knowing.
 Verdict verdict_on(const Environment&, const SetupRows&, const RealtimeConfig&);
 
 }  // namespace moldloft::firmware_like
