@@ -101,6 +101,14 @@ std::size_t stored_shots(const std::string& folder) {
   return store ? store->shots()->size() : 0;
 }
 
+std::uint64_t robot_bytes_sent(const std::string& folder) {
+  const auto store = hal::RunStore::open(folder + "/run.db", hal::RunStore::Mode::read);
+  REQUIRE(store.has_value());
+  std::uint64_t count = 0;
+  while (store->bytes(hal::LinkId::robot, hal::Direction::sent, count, 1)) ++count;
+  return count;
+}
+
 // The control points are the same to the last bit: both come from the same bytes in the same order.
 void check_fit_repeats(const std::string& run, const std::string& out) {
   const auto fitted = run_program({MOLDLOFT, "fit", run, "--out", out});
@@ -159,6 +167,37 @@ TEST_CASE("a run that ctrl-C stops, then a power cut, goes on where it was with 
   check_files(out);
   check_truth(out);
   check_fit_repeats(out, folder.file("fit"));
+}
+
+// What a service manager does after a kill: the same words again.
+TEST_CASE("a program that is killed and started again with --resume-held moves nothing until it is told to") {
+  const Devices devices;
+  const hal::TemporaryFolder folder;
+  const std::string out = folder.file("run"), control = folder.file("control");
+  const std::vector<std::string> words = {MOLDLOFT, "run",           devices.config(), "--out",
+                                          out,      "--resume-held", "--control",      control};
+  const auto tell = [&](const char* word) {
+    return run_program({MOLDLOFT, "tell", word, "--control", control});
+  };
+  {
+    ChildProcess run{words, PTY_MODEM};
+    REQUIRE_MESSAGE(run.prints("Held", 20s), run.err());
+    CHECK(tell("unhold").out == "done: Held -> Starting\n");
+    REQUIRE_MESSAGE(run.prints("boundary shots   3", run_limit), run.err());
+    run.send(SIGKILL);
+    CHECK_FALSE(run.wait(20s).has_value());
+  }
+  const auto sent_before = robot_bytes_sent(out);
+  CHECK(sent_before > 0);
+  ChildProcess run{words, PTY_MODEM};
+  REQUIRE_MESSAGE(run.prints("Held", 20s), run.err());
+  CHECK(json::parse(tell("status").out)["why"] ==
+        "started held: nothing moves before an operator sends unhold");
+  CHECK(tell("hold").err == "moldloft: refused: hold means nothing in Held\n");
+  CHECK(tell("stop").out == "done: Held -> Stopping\n");
+  CHECK(run.wait(20s) == firmware_like::exit_stopped);
+  CHECK(robot_bytes_sent(out) == sent_before);  // to the last byte: the robot has heard nothing
+  CHECK_FALSE(std::filesystem::exists(control));
 }
 
 TEST_CASE(
