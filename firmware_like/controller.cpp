@@ -43,6 +43,8 @@ Controller::Controller(const CellConfig& config, hal::Clock& clock, hal::ByteLin
                        hal::ByteLink& robot_link, const ControllerOptions& options)
     : config_{config},
       clock_{clock},
+      begin_held_{options.begin_held},
+      attended_{options.attended},
       recorder_{recorder_sizes(config), &flight_},
       scanner_link_{scanner_link, hal::LinkId::scanner, recorder_, clock},
       robot_link_{robot_link, hal::LinkId::robot, recorder_, clock},
@@ -64,7 +66,7 @@ Controller::Controller(const CellConfig& config, hal::Clock& clock, hal::ByteLin
 }
 
 void Controller::start() {
-  cell_.command(tasks::CellEvent::start);
+  cell_.command(begin_held_ ? tasks::CellEvent::start_held : tasks::CellEvent::start);
   scheduler_.start();
 }
 
@@ -96,15 +98,20 @@ void Controller::transmit_robot(hal::Instant now) {
   if (cell_.waits_for_sending()) cell_.commands_sent(clock_.now());
 }
 
-// A cell that holds for a person has come to rest as far as one run of the program goes: what to do is in why().
+// A cell that waits for a person has come to rest as far as one run of the program goes, unless a person can reach it:
+// what to do is in why(). What was measured leads to the same end each time, whoever is there.
 bool Controller::at_rest() const {
+  const bool repeats = cell_.cause() == tasks::HoldCause::measurement;
   switch (cell_.state()) {
     case tasks::CellState::complete:
     case tasks::CellState::stopped:
-    case tasks::CellState::aborted:
       return true;
+    case tasks::CellState::aborted:
+      return repeats || !attended_;
+    case tasks::CellState::clearing:
+      return !attended_;
     case tasks::CellState::held:
-      return cell_.cause() == tasks::HoldCause::person || cell_.cause() == tasks::HoldCause::measurement;
+      return repeats || (cell_.cause() == tasks::HoldCause::person && !attended_);
     default:
       return false;
   }

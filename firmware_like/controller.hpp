@@ -9,6 +9,7 @@
 // Failure      the constructor throws nothing; what goes wrong shows in the cell's state and why()
 #pragma once
 
+#include <atomic>
 #include <memory>
 
 #include "firmware_like/config.hpp"
@@ -27,6 +28,9 @@ struct ControllerOptions {
   const tasks::ShotArchive* archive = nullptr;  // shots of a run that is resumed or fitted again
   std::uint32_t epoch = 1;                      // of this run's shot ids
   bool devices = true;                          // false: archived shots only
+  bool begin_held = false;                      // nothing moves before an operator sends unhold
+  // Somebody can command the cell: what waits for a person is waited for, instead of ending the run.
+  bool attended = false;
 };
 
 class Controller {
@@ -34,9 +38,10 @@ class Controller {
   Controller(const CellConfig&, hal::Clock&, hal::ByteLink& scanner_link, hal::ByteLink& robot_link,
              const ControllerOptions& = {});
 
-  void start();  // commands the cell to start; the first tick is due now
+  void start();  // commands the cell to start, or to start held; the first tick is due now
   bool tick();   // one tick; false when the cell has come to rest
   bool at_rest() const;
+  void dismiss_operator() noexcept { attended_ = false; }  // from anywhere: nobody will come any more
 
   const CellConfig& config() const { return config_; }
   tasks::Cell& cell() { return cell_; }
@@ -65,6 +70,8 @@ class Controller {
 
   CellConfig config_;
   hal::Clock& clock_;
+  const bool begin_held_;
+  std::atomic<bool> attended_;
   hal::FlightRecorder flight_;
   hal::Recorder recorder_;
   hal::TappedLink scanner_link_, robot_link_;

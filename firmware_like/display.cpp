@@ -29,6 +29,16 @@ std::string progress_line(const tasks::CellProgress& p) {
   return line;
 }
 
+std::string status_line(const tasks::CellProgress& p) {
+  std::string line{tasks::to_string(p.state)};
+  if (p.phase != tasks::Phase::none) line += fmt::format(" / {}", tasks::to_string(p.phase));
+  if (p.boundary_shots > 0) line += fmt::format(", {} boundary shots", p.boundary_shots);
+  if (p.surface_planned > 0)
+    line += fmt::format(", {} of {} surface shots", p.surface_shots, p.surface_planned);
+  if (!p.why.empty()) line += fmt::format(": {}", p.why.view());
+  return line;
+}
+
 DisplayThread::DisplayThread(const tasks::Cell& cell, std::string head)
     : cell_{cell}, terminal_{isatty(STDERR_FILENO) != 0}, head_{std::move(head)}, thread_{[this] {
         work();

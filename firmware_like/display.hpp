@@ -13,6 +13,8 @@
 namespace moldloft::firmware_like {
 
 std::string progress_line(const tasks::CellProgress&);
+// The same without the time that passes, and with what a person has to see to: it changes when something happens.
+std::string status_line(const tasks::CellProgress&);
 
 class DisplayThread {
  public:

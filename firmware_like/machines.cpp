@@ -54,6 +54,12 @@ std::string budget_of(bool (*guard)(const tasks::TrackContext&)) {
   return text.empty() ? "?" : text;
 }
 
+template <>
+std::string budget_of(bool (*guard)(const tasks::CellContext&)) {
+  const bool before = guard({.begun = false}), after = guard({.begun = true});
+  return before && after ? "" : before ? "not begun" : "begun";
+}
+
 template <typename State, typename Table>
 Machine machine_of(Table table, int state_count) {
   Machine machine;

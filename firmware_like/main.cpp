@@ -5,6 +5,7 @@
 
 #include "firmware_like/export_command.hpp"
 #include "firmware_like/machines.hpp"
+#include "firmware_like/operator_channel.hpp"
 #include "firmware_like/replay_command.hpp"
 #include "firmware_like/run_command.hpp"
 
@@ -19,6 +20,18 @@ int main(int argc, char** argv) {
   run_command->add_option("config", run.config_path, "the cell's configuration (TOML)")->required();
   run_command->add_option("--out", run.out, "the run's folder; default: a new one under out/");
   run_command->add_flag("--resume", run.resume, "go on with the run in --out after its last stored shot");
+
+  run_command->add_flag(
+      "--resume-held", run.resume_held,
+      "begin the run in --out or go on with it, but come up held until `moldloft tell unhold`");
+  run_command->add_option("--control", run.control,
+                          "socket for `moldloft tell`; with it what waits for a person is waited for");
+
+  TellOptions tell;
+  auto* tell_command = app.add_subcommand("tell", "command a running cell, or ask for its status");
+  tell_command->add_option("command", tell.word, "unhold, hold, stop, abort, clear, status")->required();
+  tell_command->add_option("--control", tell.control, "the socket of the running cell")
+      ->capture_default_str();
 
   FitOptions fit;
   auto* fit_command =
@@ -50,6 +63,7 @@ int main(int argc, char** argv) {
     return app.exit(e) == 0 ? exit_done : exit_failed;
   }
   if (*run_command) return run_cell(run);
+  if (*tell_command) return tell_cell(tell);
   if (*fit_command) return fit_run(fit);
   if (*export_command) return export_run(to_cad);
   if (*replay_command) return replay_run(replay);

@@ -2,13 +2,19 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <ctime>
+#include <iterator>
+#include <optional>
 #include <random>
 
+#include "firmware_like/control_thread.hpp"
 #include "firmware_like/display.hpp"
+#include "firmware_like/operator_channel.hpp"
 #include "firmware_like/recorder_thread.hpp"
+#include "firmware_like/service_thread.hpp"
 #include "hal/cable.hpp"
 #include "hal/serial_link.hpp"
 #include "hal/tcp_link.hpp"
@@ -21,13 +27,19 @@ int complain(std::string_view what) {
   return exit_failed;
 }
 
-std::atomic<tasks::Cell*> interrupted_cell{nullptr};
+std::atomic<Controller*> interrupted_controller{nullptr};
 std::atomic<bool> interrupted{false};
+
+// A cell that waits for an operator, aborted or held, does so no longer.
+void end(Controller& controller) {
+  controller.dismiss_operator();
+  controller.cell().command(tasks::CellEvent::stop);
+}
 
 // The first ctrl-C stops the arm and saves; the second ends the program the hard way.
 void on_interrupt(int signal) {
   interrupted = true;
-  if (tasks::Cell* cell = interrupted_cell.load()) cell->command(tasks::CellEvent::stop);
+  if (Controller* controller = interrupted_controller.load()) end(*controller);
   std::signal(signal, SIG_DFL);
 }
 
@@ -44,14 +56,14 @@ class InterruptGuard {
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
 
-  void stops(tasks::Cell& cell) {
-    interrupted_cell = &cell;
-    if (interrupted) cell.command(tasks::CellEvent::stop);
+  void stops(Controller& controller) {
+    interrupted_controller = &controller;
+    if (interrupted) end(controller);
   }
   void let_go() {
     std::signal(SIGINT, SIG_DFL);
     std::signal(SIGTERM, SIG_DFL);
-    interrupted_cell = nullptr;
+    interrupted_controller = nullptr;
   }
 };
 
@@ -61,6 +73,15 @@ std::string memory_line(const Controller& controller) {
     line += fmt::format(" {} {:.1f} MiB,", item.subsystem, static_cast<double>(item.plan_bytes) / (1 << 20));
   return line +
          fmt::format(" {:.1f} MiB in all", static_cast<double>(total_plan(controller.memory())) / (1 << 20));
+}
+
+// What the run begins with: how much memory it has planned for, and what the operating system has not given.
+std::string head_lines(const Controller& controller, const RunConditions& conditions) {
+  std::string lines = memory_line(controller);
+  for (const auto& complaint : complaints(conditions.setup)) lines += "\nnot real-time: " + complaint;
+  const Verdict verdict = verdict_on(conditions.environment, conditions.setup, conditions.realtime);
+  if (!verdict.representative) lines += "\ntiming is not representative: " + verdict.why();
+  return lines;
 }
 
 // One line for a run that did not complete: what happened, what is saved where, how to go on.
@@ -91,6 +112,12 @@ std::string why_refused(const Controller& controller) {
 std::uint32_t fresh_epoch() {
   std::random_device device;
   return (device() ^ static_cast<std::uint32_t>(std::time(nullptr))) & 0xFFFFFu;
+}
+
+void run_to_rest(Controller& controller) {
+  controller.start();
+  while (controller.tick()) {
+  }
 }
 
 // When the run began; stores of before that was kept do not know.
@@ -155,35 +182,58 @@ int run_cell(const RunOptions& options) {
   const std::filesystem::path out =
       options.out.empty() ? default_run_path() : std::filesystem::path{options.out};
   if (options.resume && options.out.empty()) return complain("--resume: give the run's folder with --out");
+  if (options.resume_held && (options.out.empty() || options.control.empty()))
+    return complain(
+        "--resume-held: give the run's folder with --out, and --control: nobody could say unhold");
+  const bool resume = options.resume || (options.resume_held && holds_run(out));
   InterruptGuard guard;
-  auto folder =
-      options.resume ? resume_run(out, config->text) : create_run(out, config->text, RunKind::measured);
+  std::optional<OperatorSocket> operator_socket;
+  if (!options.control.empty()) {
+    auto opened = OperatorSocket::open(options.control);
+    if (!opened) return complain(opened.error());
+    operator_socket.emplace(std::move(*opened));
+  }
+  auto folder = resume ? resume_run(out, config->text) : create_run(out, config->text, RunKind::measured);
   if (!folder) return complain(folder.error().what);
 
   hal::SteadyClock clock;
   const auto scanner_link =
       hal::make_tcp_link(config->scanner.host, static_cast<std::uint16_t>(config->scanner.port));
   const auto robot_link = hal::make_serial_link(config->robot.device, config->robot.baud);
-  const auto controller = std::make_unique<Controller>(
-      *config, clock, *scanner_link, *robot_link,
-      ControllerOptions{.archive = folder->archive.get(), .epoch = fresh_epoch()});
-  guard.stops(controller->cell());
+  const auto controller =
+      std::make_unique<Controller>(*config, clock, *scanner_link, *robot_link,
+                                   ControllerOptions{.archive = folder->archive.get(),
+                                                     .epoch = fresh_epoch(),
+                                                     .begin_held = options.resume_held,
+                                                     .attended = operator_socket.has_value()});
+  guard.stops(*controller);
+  RunConditions conditions{config->realtime, read_environment(config->realtime.cpu), {}};
+  std::optional<ServiceThread> service;
   {
     FlightFiles flight{controller->flight(), folder->path};
     const CrashDump crash{*controller, folder->path};
+    const ProcessSetup process{config->realtime};
+    ControlThread control{config->realtime, [&] { run_to_rest(*controller); }};
     const RecorderThread recorder{controller->recorder(), *folder->store, flight};
-    const DisplayThread display{controller->cell(), memory_line(*controller)};
-    controller->start();
-    while (controller->tick()) {
-    }
+    std::optional<OperatorThread> operators;
+    if (operator_socket) operators.emplace(*operator_socket, controller->cell());
+    service.emplace(*controller, folder->path);
+    conditions.setup = process.rows();
+    std::ranges::copy(control.setup(), std::back_inserter(conditions.setup));
+    conditions.setup.push_back(check_ordinary_threads(control.id(), config->realtime));
+    const DisplayThread display{controller->cell(), head_lines(*controller, conditions)};
+    control.begin();
+    control.join();
+    service->loop_has_ended();
   }
   guard.let_go();
   const int code = exit_code(*controller);
-  if (!options.resume && !controller->cell().has_driven()) {
+  if (!resume && !controller->cell().has_driven()) {
     discard_run(std::move(*folder));
     return complain(why_refused(*controller)), code == exit_aborted ? exit_failed : code;
   }
-  const RunLabel label{.plate = config->name, .seed = {}, .begun = begun_of(*folder->store)};
+  const RunLabel label{
+      .plate = config->name, .seed = {}, .begun = begun_of(*folder->store), .conditions = &conditions};
   const Json summary = summary_of(*controller, label);
   if (controller->recorder().store_failed())
     complain(
@@ -208,9 +258,7 @@ int fit_run(const FitOptions& options) {
   const auto controller =
       std::make_unique<Controller>(*config, clock, none.host(), none.host(),
                                    ControllerOptions{.archive = run->archive.get(), .devices = false});
-  controller->start();
-  while (controller->tick()) {
-  }
+  run_to_rest(*controller);
   const RunLabel label{.plate = config->name, .seed = {}, .begun = begun_of(*run->store)};
   const Json summary = summary_of(*controller, label);
   std::error_code failed;

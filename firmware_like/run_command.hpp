@@ -20,6 +20,10 @@ struct RunOptions {
   std::string config_path;
   std::string out;  // empty: a new folder under out/
   bool resume = false;
+  // For a restart by a service manager: goes on with the run in `out` or begins it there, and either way comes up
+  // held, not connected to any device, until an operator says unhold over `control`.
+  bool resume_held = false;
+  std::string control;  // path of the operator's socket; empty: none
 };
 int run_cell(const RunOptions&);
 

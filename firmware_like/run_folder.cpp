@@ -17,11 +17,6 @@ std::unexpected<RunError> error(std::string what) { return std::unexpected{RunEr
 
 fs::path store_path(const fs::path& folder) { return folder / "run.db"; }
 
-std::string now_utc() {
-  const std::time_t now = std::time(nullptr);
-  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", *std::gmtime(&now));
-}
-
 std::string kind_name(RunKind kind) { return kind == RunKind::simulated ? "simulated" : "measured"; }
 
 void remove_store(const fs::path& folder) {
@@ -40,6 +35,13 @@ std::expected<void, RunError> remove_simulated(const fs::path& folder) {
 }
 
 }  // namespace
+
+std::string now_utc() {
+  const std::time_t now = std::time(nullptr);
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", *std::gmtime(&now));
+}
+
+bool holds_run(const fs::path& path) { return fs::exists(store_path(path)); }
 
 std::expected<RunFolder, RunError> create_run(const fs::path& path, const std::string& config_text,
                                               RunKind kind) {

@@ -37,6 +37,8 @@ std::expected<RunFolder, RunError> open_run(const std::filesystem::path&);  // t
 // store, and the folder if it was made for it and holds nothing else.
 void discard_run(RunFolder);
 
+bool holds_run(const std::filesystem::path&);
+std::string now_utc();                     // "2026-01-31T12:00:00Z"
 std::filesystem::path default_run_path();  // out/run-YYYYmmdd-HHMMSS
 
 }  // namespace moldloft::firmware_like

@@ -89,7 +89,9 @@ std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& option
   const auto controller = std::make_unique<Controller>(
       *config, clock, scanner_cable.host(), robot_cable.host(),
       firmware_like::ControllerOptions{.archive = folder->archive.get(),
-                                       .epoch = options.resume ? folder->archive->last_epoch() + 1 : 1});
+                                       .epoch = options.resume ? folder->archive->last_epoch() + 1 : 1,
+                                       .begin_held = options.held,
+                                       .attended = options.held});
   run_to_rest(*controller, {world, scanner_cable, robot_cable, *controller, *folder->store}, clock, options);
 
   const firmware_like::RunLabel label{.plate = plate->plate->name(), .seed = options.cell.seed};

@@ -33,6 +33,7 @@ struct SimulatedRunOptions {
   std::filesystem::path out;
   std::string config;   // the controller's cell.toml; empty: the one that fits the cell
   bool resume = false;  // goes on with the run in `out`
+  bool held = false;    // comes up held, and waits for what on_tick commands
   bool write_everything =
       true;                // false: run.db and no other file; for campaigns that look at the summary only
   bool real_time = false;  // paced by the wall clock instead of as fast as it goes

@@ -9,6 +9,19 @@
 
 namespace moldloft::tasks {
 
+namespace {
+
+// Of several commands that have come since the last tick: however often the others are sent, they never keep an abort
+// or a stop waiting.
+CellEvent most_urgent(unsigned commands) {
+  for (const auto event : {CellEvent::abort, CellEvent::stop}) {
+    if ((commands >> static_cast<int>(event) & 1u) != 0) return event;
+  }
+  return static_cast<CellEvent>(std::countr_zero(commands));
+}
+
+}  // namespace
+
 Cell::Cell(const CellSettings& settings, Clock& clock, hal::Scanner& scanner, hal::Robot& robot,
            hal::Recorder& recorder, SurfaceTask& surface, const ShotArchive* archive)
     : settings_{settings},
@@ -38,9 +51,8 @@ void Cell::run(Instant now) {
   now_ = now;
   account();
   if (const auto commands = static_cast<unsigned>(commands_.load(std::memory_order_relaxed)); commands != 0) {
-    const int first = std::countr_zero(commands);
-    commands_.fetch_and(~(1 << first), std::memory_order_relaxed);
-    const auto event = static_cast<CellEvent>(first);
+    const CellEvent event = most_urgent(commands);
+    commands_.fetch_and(~(1 << static_cast<int>(event)), std::memory_order_relaxed);
     if (event == CellEvent::hold) {
       hold(HoldCause::person, "held by command: send unhold to go on");
     } else if (event == CellEvent::abort) {
@@ -57,7 +69,7 @@ void Cell::run(Instant now) {
 }
 
 void Cell::apply(CellEvent event, const hal::Message& text) {
-  const auto* row = find_transition(cell_transitions(), state_, event, CellContext{});
+  const auto* row = find_transition(cell_transitions(), state_, event, CellContext{.begun = begun_});
   if (row == nullptr) return;
   record("cell", to_string(event), to_string(state_), to_string(row->to), text);
   state_ = row->to;
@@ -68,10 +80,17 @@ void Cell::apply(CellEvent event, const hal::Message& text) {
 void Cell::enter(CellAction action) {
   switch (action) {
     case CellAction::connect_and_calibrate:
+      begun_ = true;
+      cause_ = HoldCause::none;
+      why_ = {};
       started_ = last_account_ = now_;
       counting_ = true;
       start_step_ = StartStep::devices;
       if (settings_.devices) start_devices();
+      break;
+    case CellAction::wait_for_operator:
+      cause_ = HoldCause::person;
+      why_ = "started held: nothing moves before an operator sends unhold";
       break;
     case CellAction::measure:
       measure();

@@ -180,7 +180,7 @@ class Cell final : public Task {
   HoldCause cause_ = HoldCause::none;
   hal::Message why_;
   StartStep start_step_ = StartStep::devices;
-  bool devices_started_ = false, calibrated_ = false;
+  bool begun_ = false, devices_started_ = false, calibrated_ = false;
   bool counting_ = false, has_driven_ = false;
   bool frame_decided_ = false;  // the target that the robot's driver has not written yet
 

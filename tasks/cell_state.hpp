@@ -30,6 +30,7 @@ constexpr int cell_state_count = 14;
 
 enum class CellEvent : std::uint8_t {
   start,
+  start_held,  // after a restart: nothing may move before an operator says so
   hold,
   unhold,
   stop,
@@ -38,12 +39,13 @@ enum class CellEvent : std::uint8_t {
   reset,  // commands, and hold/abort by the cell itself
   done,   // what the present state does is finished (PackML: SC)
 };
-constexpr int cell_event_count = 8;
+constexpr int cell_event_count = 9;
 
 // What the cell begins to do on entering the next state.
 enum class CellAction : std::uint8_t {
   none,
   connect_and_calibrate,
+  wait_for_operator,
   measure,
   flush_records,
   let_motion_end,
@@ -54,7 +56,9 @@ enum class CellAction : std::uint8_t {
   forget_run,
 };
 
-struct CellContext {};
+struct CellContext {
+  bool begun = false;  // Starting was entered: devices are connected, the arm is calibrated
+};
 
 using CellTransition = Transition<CellState, CellEvent, CellAction, CellContext>;
 std::span<const CellTransition> cell_transitions();

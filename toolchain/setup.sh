@@ -5,7 +5,7 @@ set -euo pipefail
 
 packages=(
   g++ cmake ninja-build pkg-config git
-  libeigen3-dev libasio-dev libserialport-dev libsqlite3-dev libfmt-dev
+  libeigen3-dev libasio-dev libserialport-dev libsqlite3-dev libfmt-dev libsystemd-dev
   libcli11-dev libtomlplusplus-dev nlohmann-json3-dev doctest-dev
 )
 # OpenCASCADE, which reads our STEP and IGES files back: 180 MiB where X11 is there already, 384 MB on an empty system.

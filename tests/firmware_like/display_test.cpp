@@ -58,3 +58,16 @@ TEST_CASE("no progress line is longer than a terminal is wide when it does not h
   CHECK(progress_line(p).size() <= 100);
   CHECK(progress_line(p).find('\n') == std::string::npos);
 }
+
+TEST_CASE("the status line holds still while nothing happens, and says what a person has to see to") {
+  tasks::CellProgress p{.state = tasks::CellState::execute, .phase = tasks::Phase::scan_surface};
+  p.boundary_shots = 14;
+  p.surface_shots = 3;
+  p.surface_planned = 16;
+  p.now = 5s;
+  const std::string line = status_line(p);
+  CHECK(line == "Execute / ScanSurface, 14 boundary shots, 3 of 16 surface shots");
+  p.now = 6s;
+  CHECK(status_line(p) == line);
+  CHECK(status_line({.state = tasks::CellState::held, .why = "look at the plate"}) == "Held: look at the plate");
+}

@@ -69,6 +69,10 @@ void check_files(const std::string& folder) {
   CHECK(json::parse(text_of(folder + "/surface.json"))["unit"] == "mm");
   const auto timing = json::parse(text_of(folder + "/timing.json"));
   CHECK(timing["ticks"].get<int>() > 1000);
+  CHECK(timing["environment"]["sysinfo"]["sysname"] == "Linux");
+  CHECK(timing["setup"].size() == 9);
+  CHECK(timing["representative"].get<bool>() == timing["why"].get<std::string>().empty());
+  CHECK(timing["why"] != "virtual time");
   std::istringstream events{text_of(folder + "/events.jsonl")};
   int count = 0;
   for (std::string line; std::getline(events, line); ++count) REQUIRE(json::accept(line));
@@ -96,6 +100,14 @@ void check_truth(const std::string& folder) {
 std::size_t stored_shots(const std::string& folder) {
   const auto store = hal::RunStore::open(folder + "/run.db", hal::RunStore::Mode::read);
   return store ? store->shots()->size() : 0;
+}
+
+std::uint64_t robot_bytes_sent(const std::string& folder) {
+  const auto store = hal::RunStore::open(folder + "/run.db", hal::RunStore::Mode::read);
+  REQUIRE(store.has_value());
+  std::uint64_t count = 0;
+  while (store->bytes(hal::LinkId::robot, hal::Direction::sent, count, 1)) ++count;
+  return count;
 }
 
 // The control points are the same to the last bit: both come from the same bytes in the same order.
@@ -156,6 +168,37 @@ TEST_CASE("a run that ctrl-C stops, then a power cut, goes on where it was with 
   check_files(out);
   check_truth(out);
   check_fit_repeats(out, folder.file("fit"));
+}
+
+// What a service manager does after a kill: the same words again.
+TEST_CASE("a program that is killed and started again with --resume-held moves nothing until it is told to") {
+  const Devices devices;
+  const hal::TemporaryFolder folder;
+  const std::string out = folder.file("run"), control = folder.file("control");
+  const std::vector<std::string> words = {MOLDLOFT, "run",           devices.config(), "--out",
+                                          out,      "--resume-held", "--control",      control};
+  const auto tell = [&](const char* word) {
+    return run_program({MOLDLOFT, "tell", word, "--control", control});
+  };
+  {
+    ChildProcess run{words, PTY_MODEM};
+    REQUIRE_MESSAGE(run.prints("Held", 20s), run.err());
+    CHECK(tell("unhold").out == "done: Held -> Starting\n");
+    REQUIRE_MESSAGE(run.prints("boundary shots   3", run_limit), run.err());
+    run.send(SIGKILL);
+    CHECK_FALSE(run.wait(20s).has_value());
+  }
+  const auto sent_before = robot_bytes_sent(out);
+  CHECK(sent_before > 0);
+  ChildProcess run{words, PTY_MODEM};
+  REQUIRE_MESSAGE(run.prints("Held", 20s), run.err());
+  CHECK(json::parse(tell("status").out)["why"] ==
+        "started held: nothing moves before an operator sends unhold");
+  CHECK(tell("hold").err == "moldloft: refused: hold means nothing in Held\n");
+  CHECK(tell("stop").out == "done: Held -> Stopping\n");
+  CHECK(run.wait(20s) == firmware_like::exit_stopped);
+  CHECK(robot_bytes_sent(out) == sent_before);  // to the last byte: the robot has heard nothing
+  CHECK_FALSE(std::filesystem::exists(control));
 }
 
 TEST_CASE(

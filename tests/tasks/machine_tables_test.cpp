@@ -78,3 +78,44 @@ TEST_CASE("abort is taken from every state but those that have aborted already")
           aborted);
   }
 }
+
+// Every state that any order of events can lead to, without those of `never`.
+std::set<CellState> reachable_without(CellState from, CellContext context, std::set<CellEvent> never) {
+  std::set<CellState> reached{from};
+  for (std::size_t before = 0; before != reached.size();) {
+    before = reached.size();
+    for (const CellState state : std::set{reached}) {
+      for (int e = 0; e < cell_event_count; ++e) {
+        const auto event = static_cast<CellEvent>(e);
+        const auto* row =
+            never.contains(event) ? nullptr : find_transition(cell_transitions(), state, event, context);
+        if (row != nullptr) reached.insert(row->to);
+      }
+    }
+  }
+  return reached;
+}
+
+TEST_CASE("a cell that starts held moves in no order of events that lacks an operator's unhold and start") {
+  const auto* row =
+      find_transition(cell_transitions(), CellState::idle, CellEvent::start_held, CellContext{});
+  REQUIRE(row != nullptr);
+  CHECK(row->to == CellState::held);
+  CHECK(row->action == CellAction::wait_for_operator);
+  const auto reached = reachable_without(row->to, {.begun = false}, {CellEvent::unhold, CellEvent::start});
+  for (const auto moving :
+       {CellState::starting, CellState::execute, CellState::unholding, CellState::completing})
+    CHECK_FALSE(reached.contains(moving));
+  CHECK(reached.contains(CellState::stopped));
+  CHECK(reached.contains(CellState::aborted));
+}
+
+TEST_CASE("unhold begins a cell that was started held, and takes up again one that has begun") {
+  const auto after = [](bool begun) {
+    return find_transition(cell_transitions(), CellState::held, CellEvent::unhold,
+                           CellContext{.begun = begun})
+        ->to;
+  };
+  CHECK(after(false) == CellState::starting);
+  CHECK(after(true) == CellState::unholding);
+}

@@ -35,6 +35,7 @@ const std::vector<Library> libraries = {
     {"fmt/", {"hal", "tasks", "firmware_like", "host_sim"}, false},
     {"nlohmann/", {"firmware_like", "host_sim"}, false},
     {"toml++/", {"firmware_like"}, false},
+    {"systemd/", {"firmware_like"}, true},
     {"CLI/", {"firmware_like", "host_sim"}, false},
     {"boost/", {}, true},
     {"iostream", {}, true},  // its constructors run before main, and it formats by global state
