@@ -49,7 +49,7 @@ trap end EXIT
 kernel_of_the_distribution() {
   local package
   package=$(apt-cache depends linux-image-rt-amd64 2>/dev/null | sed -n 's/^ *Depends: \(linux-image-.*-rt-amd64\)$/\1/p' | head -1)
-  [ -n "$package" ] || cannot "apt knows no linux-image-rt-amd64"
+  [ -n "$package" ] || cannot "apt knows no linux-image-rt-amd64; is its list of packages there (apt-get update)?"
   kernel=build/cell-pc/$package/vmlinuz
   [ -f "$kernel" ] && return
   echo "cell-pc: fetching $package"
