@@ -15,9 +15,9 @@ install(FILES ${package}/sysusers.conf RENAME moldloft.conf DESTINATION lib/sysu
 # The file that explains every key is the configuration that is installed: there is no second one to grow old.
 install(FILES firmware_like/cell.example.toml RENAME cell.toml DESTINATION /etc/moldloft COMPONENT controller)
 
-# gzip as the distribution's own pages are; made when CMake configures.
+# gzip as the distribution's own pages are, without a date; made when CMake configures.
 function(install_compressed file name destination)
-  file(ARCHIVE_CREATE OUTPUT ${PROJECT_BINARY_DIR}/package/${name} PATHS ${file} FORMAT raw COMPRESSION GZip)
+  execute_process(COMMAND gzip -9n -c ${file} OUTPUT_FILE ${PROJECT_BINARY_DIR}/package/${name} COMMAND_ERROR_IS_FATAL ANY)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
   install(FILES ${PROJECT_BINARY_DIR}/package/${name} DESTINATION ${destination} COMPONENT controller)
 endfunction()
@@ -44,10 +44,9 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 # systemd-sysusers makes the user, udevadm is asked to read the rule; on a machine without systemd neither is missed.
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "systemd")
-# The first line is the synopsis; CPack indents the rest.
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "controller of a cell that measures formed ship plates")
 set(CPACK_COMPONENT_CONTROLLER_DESCRIPTION
-"controller of a cell that measures formed ship plates
-A robot carries a laser-stripe scanner to a plate, finds its edge, walks
+"A robot carries a laser-stripe scanner to a plate, finds its edge, walks
 round it and sweeps it; the result is the outline and the surface as one
 B-spline, also as STEP and IGES, with the timing of the run.
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs what building needs, as packages of the distribution (Debian 12 or later); with --tests also what only some
-# tests ask for. Nothing is done when all of it is there. Needs root or sudo only when something is missing.
+# tests ask for, with --aarch64 the cross compiler and the emulator that toolchain/aarch64/build.sh asks for. Nothing is done
+# when all of it is there. Needs root or sudo only when something is missing.
 set -euo pipefail
 
 packages=(
@@ -18,6 +19,7 @@ if [ "${1-}" = --tests ]; then
   packages+=(dpkg-dev systemd python3 cpio busybox-static rt-tests qemu-system-x86)
   [ "$(dpkg --print-architecture)" = amd64 ] && wanted+=(linux-image-rt-amd64)
 fi
+[ "${1-}" = --aarch64 ] && packages+=(dpkg-dev g++-aarch64-linux-gnu qemu-user)
 
 missing=()
 for package in "${packages[@]}"; do
