@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "firmware_like/results.hpp"
+#include "hal/serial_link.hpp"
 #include "host_sim/cell_config.hpp"
 #include "host_sim/pty_link.hpp"
 #include "host_sim/tcp_server_link.hpp"
@@ -32,6 +33,26 @@ void catch_signals() {
   ::sigaction(SIGTERM, &action, nullptr);
 }
 
+// The robot's end of the line, and the device by which the controller reaches the other end.
+struct RobotLine {
+  std::unique_ptr<hal::ByteLink> link;
+  std::string served_on, controllers_device;
+};
+
+std::expected<RobotLine, SimError> robot_line(const DeviceOptions& options) {
+  if (options.robot_serial.empty()) {
+    auto pty = PtyLink::create(options.robot_pty);
+    if (!pty) return std::unexpected(pty.error());
+    const std::string path = (*pty)->path();
+    return RobotLine{std::move(*pty), path, path};
+  }
+  // The line's format is the controller's own default: the servers know one robot.
+  auto port = hal::make_serial_link(options.robot_serial, firmware_like::CellConfig{}.robot.baud);
+  port->open();
+  if (port->state() != hal::LinkState::open) return std::unexpected(SimError{std::string(port->why())});
+  return RobotLine{std::move(port), options.robot_serial, options.controller_serial};
+}
+
 }  // namespace
 
 int run_devices(const DeviceOptions& options) {
@@ -39,18 +60,18 @@ int run_devices(const DeviceOptions& options) {
   if (!plate) return failed(plate.error());
   const auto scanner = TcpServerLink::listen_on(options.scanner_port);
   if (!scanner) return failed(scanner.error());
-  const auto robot = PtyLink::create(options.robot_pty);
+  const auto robot = robot_line(options);
   if (!robot) return failed(robot.error());
 
   if (!options.cell_toml.empty()) {
-    const CellAddresses here{.scanner_port = (*scanner)->port(), .robot_device = (*robot)->path()};
+    const CellAddresses here{.scanner_port = (*scanner)->port(), .robot_device = robot->controllers_device};
     const auto written = firmware_like::write_file(options.cell_toml, cell_toml(options.cell, *plate, here));
     if (!written) return failed({written.error().what});
   }
 
   catch_signals();
-  SimulatedWorld world(options.cell, *plate, **scanner, **robot);
-  fmt::print("ready: scanner 127.0.0.1:{} robot {} plate {} seed {}\n", (*scanner)->port(), (*robot)->path(),
+  SimulatedWorld world(options.cell, *plate, **scanner, *robot->link);
+  fmt::print("ready: scanner 127.0.0.1:{} robot {} plate {} seed {}\n", (*scanner)->port(), robot->served_on,
              plate->plate->name(), options.cell.seed);
   std::fflush(stdout);
 

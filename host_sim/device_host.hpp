@@ -1,5 +1,5 @@
-// The simulated devices in real time: the scanner on a loopback TCP port, the robot on a pseudo-terminal, for
-// a controller that cannot tell them from real ones.
+// The simulated devices in real time: the scanner on a loopback TCP port, the robot on a pseudo-terminal or on a
+// serial port of the machine's own, for a controller that cannot tell them from real ones.
 #pragma once
 
 #include <string>
@@ -12,6 +12,9 @@ struct DeviceOptions {
   CellDescription cell;
   std::uint16_t scanner_port = hal::psc1::default_port;  // 0: any that is free
   std::string robot_pty = "/tmp/moldloft-robot";
+  std::string robot_serial;  // a serial port instead of the pseudo-terminal; empty: none
+  std::string controller_serial =
+      "/dev/ttyS0";       // the controller's port, at the other end of that one's cable
   std::string cell_toml;  // where to write a configuration that fits these devices; empty: nowhere
 };
 

@@ -104,9 +104,17 @@ int main(int argc, char** argv) {
   add_cell_options(*devices_command, devices.cell);
   devices_command->add_option("--scanner-port", devices.scanner_port, "loopback TCP port, 0 for any")
       ->capture_default_str();
-  devices_command->add_option("--robot-pty", devices.robot_pty, "name for the robot's terminal")
+  auto* pty = devices_command->add_option("--robot-pty", devices.robot_pty, "name for the robot's terminal")
+                  ->capture_default_str();
+  auto* serial = devices_command
+                     ->add_option("--robot-serial", devices.robot_serial,
+                                  "serve the robot on this serial port instead, 115200 baud")
+                     ->excludes(pty);
+  devices_command
+      ->add_option("--controller-serial", devices.controller_serial,
+                   "the controller's port at the other end of that cable, for --cell")
+      ->needs(serial)
       ->capture_default_str();
-
   devices_command->add_option("--cell", devices.cell_toml,
                               "write a configuration that fits these devices to this file");
 

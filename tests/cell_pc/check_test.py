@@ -1,0 +1,107 @@
+"""The gate on the emulated cell PC against results written by hand: good ones pass, and each limit broken alone is told.
+
+    python3 check_test.py PATH/TO/check.py
+"""
+import copy
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+CHECK = sys.argv.pop(1)
+
+# Of 5,000 samples 4,997 lie at 9 us or below, so 99.9 % do not exceed 9; the largest is 11.
+GOOD = {
+    "cell.exit": 0,
+    "cyclictest.json": {"thread": {"0": {"histogram": {"7": 3900, "8": 1080, "9": 17, "11": 3}, "cycles": 5000, "max": 11}}},
+    "run/summary.json": {"result": "complete", "message": ""},
+    "run/timing.json": {
+        "tick_us": 1000.0, "missed_ticks": 0, "last_miss_cause": "",
+        "wake_up": {"p50_us": 7.7, "p99_us": 9.0, "p999_us": 10.7, "max_us": 33.0},
+        "environment": {"sysinfo": {"realtime": 1}},
+        "setup": [{"what": "scheduling", "wanted": "SCHED_FIFO 50", "got": "SCHED_FIFO 50", "ok": True}],
+    },
+}
+LATENCY = {"ours": {"p50_us": 7.5, "p99_us": 8.5, "p999_us": 9.6, "max_us": 12.0, "missed": 0},
+           "cyclictest": {"p50_us": 7.0, "p99_us": 8.0, "p999_us": 8.0, "max_us": 11.0, "missed": 0}}
+
+
+def write(folder, files):
+    for name, content in files.items():
+        path = pathlib.Path(folder) / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(content))
+
+
+def check(first, second):
+    with tempfile.TemporaryDirectory() as a, tempfile.TemporaryDirectory() as b:
+        write(a, first)
+        write(b, second)
+        done = subprocess.run([sys.executable, CHECK, a, b], capture_output=True, text=True, timeout=60)
+        return done.returncode, done.stderr.splitlines()
+
+
+class Gate(unittest.TestCase):
+    def refuses(self, change, *lines, both=True):
+        """Both runs changed: each is told, and nothing else is. One changed: the runs also differ."""
+        changed = copy.deepcopy(GOOD)
+        change(changed)
+        code, told = check(changed, changed if both else GOOD)
+        self.assertEqual(code, 1)
+        wanted = [f"cell-pc: run {run}: {line}" for run in (1, 2) for line in lines] if both else [f"cell-pc: {line}" for line in lines]
+        self.assertEqual(told, wanted)
+
+    def test_results_on_the_limits_pass(self):
+        self.assertEqual(check(GOOD, GOOD), (0, []))
+        self.assertEqual(check(GOOD | {"latency.json": LATENCY}, GOOD | {"latency.json": LATENCY}), (0, []))
+
+    def test_a_cell_that_did_not_complete(self):
+        def held(files):
+            files["cell.exit"] = 2
+            files["run/summary.json"] = {"result": "held", "message": "no edge"}
+        self.refuses(held, "the cell ended with 2, held: no edge")
+        def unsaved(files): files["cell.exit"] = 1
+        self.refuses(unsaved, "the cell ended with 1, complete: ")
+
+    def test_a_missed_tick(self):
+        def missed(files): files["run/timing.json"] |= {"missed_ticks": 1, "last_miss_cause": "surface"}
+        self.refuses(missed, "run: 1 missed ticks, the last by 'surface'; 0 allowed")
+
+    def test_wake_up_later_than_the_limits(self):
+        def late(files): files["run/timing.json"]["wake_up"]["p999_us"] = 10.9
+        self.refuses(late, "run: wake-up p999_us 10.9, cyclictest 9.0: more than 1.2 times as much")
+        def once(files): files["run/timing.json"]["wake_up"]["max_us"] = 33.1
+        self.refuses(once, "run: wake-up max_us 33.1, cyclictest 11.0: more than 3.0 times as much")
+
+    def test_a_slower_tick_is_no_way_out(self):
+        def slower(files): files["run/timing.json"]["tick_us"] = 2000.0
+        self.refuses(slower, "a tick of 2000.0 us; the limits are for 1000")
+
+    def test_settings_that_were_not_had(self):
+        def ordinary(files): files["run/timing.json"]["environment"]["sysinfo"]["realtime"] = 0
+        self.refuses(ordinary, "PREEMPT_RT was not recognised")
+        def unread(files): files["run/timing.json"]["setup"] = []
+        self.refuses(unread, "no setting was read back")
+        def refused(files): files["run/timing.json"]["setup"][0] |= {"got": "SCHED_OTHER", "ok": False}
+        self.refuses(refused, "scheduling: SCHED_OTHER, wanted SCHED_FIFO 50")
+
+    def test_runs_that_differ(self):
+        def apart(files): files["run/timing.json"]["wake_up"]["p99_us"] = 9.5
+        self.refuses(apart, "the two runs: run: wake-up p99_us 9.50 and 9.00: they differ by more than 5%", both=False)
+        def one_only(files): files["latency.json"] = LATENCY
+        self.refuses(one_only, "the two runs: latency: in one of the runs only", both=False)
+
+    def test_the_programs_own_comparison_counts_too(self):
+        def late(files): files["latency.json"] = LATENCY | {"ours": LATENCY["ours"] | {"p999_us": 9.7, "missed": 2}}
+        self.refuses(late, "latency: 2 missed ticks, the last by ''; 0 allowed",
+                     "latency: wake-up p999_us 9.7, cyclictest 8.0: more than 1.2 times as much")
+
+    def test_results_that_are_not_there(self):
+        code, told = check(GOOD, {"cell.exit": 0})
+        self.assertEqual((code, len(told)), (1, 1))
+        self.assertTrue(told[0].startswith("cell-pc: the results cannot be read: "), told)
+
+
+unittest.main()

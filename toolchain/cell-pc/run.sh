@@ -1,0 +1,117 @@
+#!/usr/bin/env bash
+# Boots the emulated cell PC, has it do the jobs, and leaves their results in a folder. README.md beside this file says what
+# the machine is and what its figures are worth.
+#
+#     toolchain/cell-pc/run.sh [--build DIR] [--out DIR] [--jobs cyclictest,cell] [--cpu max] [--limit SECONDS] [-- DEVICES...]
+#
+# --build   the build tree with moldloft and moldloft-sim; default build/release
+# --out     where the results go; default build/cell-pc/results
+# --jobs    in this order: cyclictest, cell, latency; default all that the program knows
+# --cpu     QEMU's model of the processor
+# --limit   seconds of this machine's time after which the emulator is ended
+# what follows -- goes to moldloft-sim devices, such as --plate dome --seed 7
+#
+# Exit code 77: this machine cannot emulate the PC, and why.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+build=build/release out=build/cell-pc/results jobs= cpu=max limit=900
+while [ $# -gt 0 ]; do
+  case $1 in
+    --build) build=$2 ;;
+    --out) out=$2 ;;
+    --jobs) jobs=$2 ;;
+    --cpu) cpu=$2 ;;
+    --limit) limit=$2 ;;
+    --) shift; break ;;
+    *) echo "cell-pc: $1 is no option; the head of $0 names them" >&2; exit 1 ;;
+  esac
+  shift 2
+done
+devices=("$@")
+[ ${#devices[@]} -gt 0 ] || devices=(--seed 1)
+
+cannot() { echo "cell-pc: skipped: $1" >&2; exit 77; }
+for program in qemu-system-x86_64 cyclictest cpio busybox dpkg-deb; do
+  command -v $program >/dev/null || cannot "$program is missing; toolchain/setup.sh --tests installs what there is"
+done
+[ "$(dpkg --print-architecture)" = amd64 ] || cannot "the emulated PC is an amd64 machine and runs this machine's programs"
+
+scratch=$(mktemp -d)
+emulator=
+end() {
+  if [ -n "$emulator" ]; then kill "$emulator" 2>/dev/null || true; wait "$emulator" 2>/dev/null || true; fi
+  rm -rf "$scratch"
+}
+trap end EXIT
+
+# The distribution's own PREEMPT_RT kernel, taken out of its package; nothing is installed on this machine.
+kernel_of_the_distribution() {
+  local package
+  package=$(apt-cache depends linux-image-rt-amd64 2>/dev/null | sed -n 's/^ *Depends: \(linux-image-.*-rt-amd64\)$/\1/p' | head -1)
+  [ -n "$package" ] || cannot "apt knows no linux-image-rt-amd64; is its list of packages there (apt-get update)?"
+  kernel=build/cell-pc/$package/vmlinuz
+  [ -f "$kernel" ] && return
+  echo "cell-pc: fetching $package"
+  (cd "$scratch" && apt-get download "$package" >/dev/null 2>&1) || cannot "$package cannot be downloaded"
+  dpkg-deb --fsys-tarfile "$scratch"/linux-image-*.deb | tar -x -C "$scratch" --wildcards './boot/vmlinuz-*'
+  mkdir -p "$(dirname "$kernel")"
+  mv "$scratch"/boot/vmlinuz-* "$kernel.new" && mv "$kernel.new" "$kernel"  # two that fetch at once do not meet halfway
+}
+
+# The root of the PC: the package as dpkg unpacks it, and beside it what does not ship: the simulated devices.
+make_root() {
+  local root=$scratch/root library
+  cpack --config "$build/CPackConfig.cmake" -B "$scratch/package" >"$scratch/cpack.log" || { cat "$scratch/cpack.log" >&2; exit 1; }
+  mkdir -p "$root"/{bin,dev,proc,sys,tmp,run}
+  dpkg-deb -x "$scratch"/package/moldloft_*.deb "$root"
+  strip -o "$root/usr/bin/moldloft-sim" "$build/bin/moldloft-sim"
+  cp "$(command -v cyclictest)" "$root/usr/bin/"
+  cp "$(command -v busybox)" "$root/bin/busybox"
+  install -m 755 toolchain/cell-pc/init "$root/init"
+  printf '%s\n' "jobs='$jobs'" "devices='${devices[*]}'" >"$root/etc/cell-pc.conf"
+  for library in $(ldd "$root"/usr/bin/* | grep -o '/[^ ]*\.so[^ ]*' | sort -u); do
+    install -D -m 755 "$library" "$root$library"
+  done
+  (cd "$root" && find . -print0 | cpio --null --create --format=newc --quiet --owner=0:0 | gzip -1) >"$scratch/initramfs"
+}
+
+# Time is the count of instructions: one takes 2 ns, and when the processor idles time jumps to what comes next, so the
+# figures do not depend on what else this machine does. COM1 is the console, COM2 the controller's port; the robot's server
+# has a 16550 on the PCI bus, for COM3 and COM4 would have to share lines with them. The two are crossed by a socket.
+boot() {
+  local pc=(
+    qemu-system-x86_64 -accel tcg -icount shift=1,sleep=off -cpu "$cpu" -m 512
+    -nodefaults -display none -no-reboot -net none
+    -kernel "$kernel" -initrd "$scratch/initramfs" -append "console=ttyS0 quiet panic=1"
+    -chardev "file,id=console,path=$scratch/console" -device isa-serial,index=0,chardev=console
+    -chardev "socket,id=controller,path=$scratch/cable,server=on,wait=off" -device isa-serial,index=1,chardev=controller
+    -chardev "socket,id=robot,path=$scratch/cable" -device pci-serial,chardev=robot
+  )
+  timeout "$limit" "${pc[@]}" </dev/null &
+  emulator=$!
+  local code=0
+  wait "$emulator" || code=$?
+  emulator=
+  [ $code -eq 0 ] && return
+  tail -20 "$scratch/console" >&2 || true
+  echo "cell-pc: the emulator ended with $code (124: it did not finish within $limit s)" >&2
+  exit 1
+}
+
+# The guest prints its results as a text between two lines of the console.
+collect() {
+  rm -rf "$out" && mkdir -p "$out"
+  tr -d '\r' <"$scratch/console" | sed '/^-----BEGIN RESULTS-----$/,/^-----END RESULTS-----$/d' >"$out/console"
+  tr -d '\r' <"$scratch/console" | sed -n '/^-----BEGIN RESULTS-----$/,/^-----END RESULTS-----$/p' | sed '1d;$d' |
+    base64 -d | tar -xz -C "$out" --warning=no-timestamp ||
+    { tail -20 "$out/console" >&2; echo "cell-pc: no results came out of the machine" >&2; exit 1; }
+}
+
+kernel_of_the_distribution
+make_root
+began=$(date +%s)
+boot
+collect
+grep '^cell-pc:' "$out/console"
+echo "cell-pc: results in $out; $(($(date +%s) - began)) s of this machine's time"
