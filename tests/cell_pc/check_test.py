@@ -18,7 +18,7 @@ GOOD = {
     "cyclictest.json": {"thread": {"0": {"histogram": {"7": 3900, "8": 1080, "9": 17, "11": 3}, "cycles": 5000, "max": 11}}},
     "run/summary.json": {"result": "complete", "message": ""},
     "run/timing.json": {
-        "tick_us": 1000.0, "missed_ticks": 0, "last_miss_cause": "",
+        "tick_us": 1000.0, "missed_ticks": 0, "missed_by_cause": {},
         "wake_up": {"p50_us": 7.7, "p99_us": 9.0, "p999_us": 10.7, "max_us": 33.0},
         "environment": {"sysinfo": {"realtime": 1}},
         "setup": [{"what": "scheduling", "wanted": "SCHED_FIFO 50", "got": "SCHED_FIFO 50", "ok": True}],
@@ -66,7 +66,7 @@ class Gate(unittest.TestCase):
         self.refuses(unsaved, "the cell ended with 1, complete: ")
 
     def test_a_missed_tick(self):
-        def missed(files): files["run/timing.json"] |= {"missed_ticks": 1, "last_miss_cause": "surface"}
+        def missed(files): files["run/timing.json"] |= {"missed_ticks": 1, "missed_by_cause": {"computing": 1}}
         self.refuses(missed, "run: 1 missed ticks, the last by 'surface'; 0 allowed")
 
     def test_wake_up_later_than_the_limits(self):
