@@ -7,6 +7,7 @@
 #include <ctime>
 #include <random>
 
+#include "firmware_like/control_loop.hpp"
 #include "firmware_like/display.hpp"
 #include "firmware_like/recorder_thread.hpp"
 #include "hal/cable.hpp"
@@ -168,12 +169,11 @@ int run_cell(const RunOptions& options) {
       *config, clock, *scanner_link, *robot_link,
       ControllerOptions{.archive = folder->archive.get(), .epoch = fresh_epoch()});
   guard.stops(controller->cell());
+  ThreadCounts counts;
   {
     const RecorderThread recorder{controller->recorder(), *folder->store};
     const DisplayThread display{controller->cell(), memory_line(*controller)};
-    controller->start();
-    while (controller->tick()) {
-    }
+    counts = run_to_rest(*controller);
   }
   guard.let_go();
   const int code = exit_code(*controller);
@@ -181,7 +181,8 @@ int run_cell(const RunOptions& options) {
     discard_run(std::move(*folder));
     return complain(why_refused(*controller)), code == exit_aborted ? exit_failed : code;
   }
-  const RunLabel label{.plate = config->name, .seed = {}, .begun = begun_of(*folder->store)};
+  const RunLabel label{
+      .plate = config->name, .seed = {}, .begun = begun_of(*folder->store), .control_thread = counts};
   const Json summary = summary_of(*controller, label);
   if (controller->recorder().store_failed())
     complain(
