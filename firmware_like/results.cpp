@@ -101,10 +101,11 @@ Json summary_of(const Controller& c, const RunLabel& label) {
   return j;
 }
 
-Json timing_of(const Controller& c) {
+Json timing_of(const Controller& c, const RunConditions* conditions) {
   const auto& s = c.scheduler();
   Json j;
   j["schema"] = 1;
+  put_conditions(j, conditions);
   j["tick_us"] = micros(s.settings().tick);
   j["ticks"] = s.ticks();
   j["missed_ticks"] = s.missed_ticks();
@@ -223,7 +224,7 @@ std::expected<void, RunError> write_results(const Controller& c, const RunFolder
   if (!events) return std::unexpected{RunError{events.error().what}};
   write("events.jsonl", events_jsonl(*events));
   write("overview.svg", picture(c, label, summary, std::move(fields)));
-  write("timing.json", timing_of(c).dump(2) + "\n");
+  write("timing.json", timing_of(c, label.conditions).dump(2) + "\n");
   write("summary.json", summary.dump(2) + "\n");
   return result;
 }

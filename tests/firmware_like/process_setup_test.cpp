@@ -203,7 +203,7 @@ TEST_CASE("without rights nothing is had, everything is said, and the process go
   CHECK(seen["grown"] == "grown");
 }
 
-// The trap: locking the pages of the future succeeds while the limit has room, and a thread or an allocation fails later.
+// The trap: locking the pages of the future succeeds while the limit has room, and a thread or an allocation fails then.
 // A small program of its own, since only such a one fits into a limit that an ordinary user has.
 TEST_CASE("a finite limit on locked memory locks what is there and never makes a later thread fail" *
           doctest::skip(!test::is_root() || own_allocator)) {

@@ -1,4 +1,5 @@
-// Sets the process up as far as it may, then asks for memory and threads as a program does later on, and says what it got.
+// Sets the process up as far as it may, then asks for memory and threads as a program does later on, and says what
+// it got.
 #include <fmt/format.h>
 
 #include <fstream>
