@@ -72,6 +72,15 @@ void read_robot(TomlSection s, RobotConfig& c) {
   s.finish();
 }
 
+void read_realtime(TomlSection s, RealtimeConfig& c) {
+  s.flag("lock_memory", c.lock_memory);
+  s.integer("heap_reserve_mib", c.heap_reserve_mib, 0, 1024);
+  s.integer("priority", c.priority, 0, 98);
+  s.integer("cpu", c.cpu, -1, 1023);
+  s.integer("cpu_latency_us", c.cpu_latency_us, -1, 1'000'000);
+  s.finish();
+}
+
 void read_rest(TomlSection& file, CellConfig& c) {
   TomlSection cell = file.section("cell");
   cell.text("name", c.name);
@@ -181,6 +190,7 @@ std::string first_difference(const std::string& text, const std::string& other) 
                                   "robot.device", "robot.baud"}) {
       keys->erase(addressed);
     }
+    std::erase_if(*keys, [](const auto& key) { return key.first.starts_with("realtime."); });
   }
   for (const auto& [key, value] : a) {
     if (const auto same = b.find(key); same == b.end() || same->second != value) return key;
@@ -217,6 +227,7 @@ std::expected<CellConfig, ConfigError> parse_config(const std::string& text, con
     read_scanner(file.section("scanner"), config.scanner);
     read_robot(file.section("robot"), config.robot);
     read_rest(file, config);
+    read_realtime(file.section("realtime"), config.realtime);
     file.finish();
     if (!error) error = check_together(table, config);
   } catch (const toml::parse_error& e) {

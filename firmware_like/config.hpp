@@ -7,6 +7,7 @@
 #include <expected>
 #include <string>
 
+#include "firmware_like/realtime_config.hpp"
 #include "hal/psc1.hpp"
 #include "tasks/cell.hpp"
 
@@ -61,6 +62,7 @@ struct CellConfig {
   double scan_margin_mm = 2;
   double finest_span_mm = 10;  // of the surface's net
   double fit_tolerance_mm = 0.005;
+  RealtimeConfig realtime;
 };
 
 CellConfig default_config();
@@ -68,8 +70,8 @@ std::expected<CellConfig, ConfigError> load_config(const std::string& path);
 std::expected<CellConfig, ConfigError> parse_config(const std::string& text, const std::string& path);
 
 // The first key whose value differs between two configurations and would make a run measure differently
-// ("start.yaw_deg"); empty when there is none. Where the devices are found, names and comments make no
-// difference.
+// ("start.yaw_deg"); empty when there is none. Where the devices are found, when the program gets its
+// turn, names and comments make no difference.
 std::string first_difference(const std::string& text, const std::string& other);
 
 }  // namespace moldloft::firmware_like

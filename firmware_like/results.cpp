@@ -48,16 +48,6 @@ Json histogram_json(const tasks::Histogram& h) {
           {"overflows", h.overflows()}};
 }
 
-Json counts_json(const ThreadCounts& c) {
-  return {{"ticks", c.ticks},
-          {"minor_faults", c.minor_faults},
-          {"major_faults", c.major_faults},
-          {"voluntary_switches", c.voluntary_switches},
-          {"involuntary_switches", c.involuntary_switches},
-          {"migrations", c.migrations},
-          {"suspensions", c.suspensions}};
-}
-
 }  // namespace
 
 Json summary_of(const Controller& c, const RunLabel& label) {
@@ -111,10 +101,11 @@ Json summary_of(const Controller& c, const RunLabel& label) {
   return j;
 }
 
-Json timing_of(const Controller& c, const std::optional<ThreadCounts>& control_thread) {
+Json timing_of(const Controller& c, const RunConditions* conditions) {
   const auto& s = c.scheduler();
   Json j;
   j["schema"] = 1;
+  put_conditions(j, conditions);
   j["tick_us"] = micros(s.settings().tick);
   j["ticks"] = s.ticks();
   j["missed_ticks"] = s.missed_ticks();
@@ -122,7 +113,6 @@ Json timing_of(const Controller& c, const std::optional<ThreadCounts>& control_t
   j["wake_up"] = histogram_json(s.wake_up());
   j["slack"] = histogram_json(s.slack());
   j["frame_to_command"] = histogram_json(c.cell().frame_to_command());
-  if (control_thread) j["control_thread"] = counts_json(*control_thread);
   for (const auto& t : s.tasks()) {
     j["tasks"].push_back({{"name", std::string{t.spec.name}},
                           {"period_ticks", t.spec.period_ticks},
@@ -234,7 +224,7 @@ std::expected<void, RunError> write_results(const Controller& c, const RunFolder
   if (!events) return std::unexpected{RunError{events.error().what}};
   write("events.jsonl", events_jsonl(*events));
   write("overview.svg", picture(c, label, summary, std::move(fields)));
-  write("timing.json", timing_of(c, label.control_thread).dump(2) + "\n");
+  write("timing.json", timing_of(c, label.conditions).dump(2) + "\n");
   write("summary.json", summary.dump(2) + "\n");
   return result;
 }

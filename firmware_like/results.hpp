@@ -16,10 +16,10 @@
 #include <string>
 
 #include "firmware_like/controller.hpp"
+#include "firmware_like/environment_report.hpp"
 #include "firmware_like/picture.hpp"
 #include "firmware_like/run_folder.hpp"
 #include "firmware_like/surface_file.hpp"
-#include "firmware_like/thread_counts.hpp"
 
 namespace moldloft::firmware_like {
 
@@ -27,11 +27,11 @@ struct RunLabel {
   std::string plate = "measured";
   std::optional<std::uint64_t> seed;  // of a simulated run
   std::string begun = {};             // when, UTC, as the run's store holds it; empty in a simulated run
-  std::optional<ThreadCounts> control_thread = {};  // of a run in real time
+  const RunConditions* conditions = nullptr;  // of timing.json; null: virtual time
 };
 
 Json summary_of(const Controller&, const RunLabel&);
-Json timing_of(const Controller&, const std::optional<ThreadCounts>& control_thread = {});
+Json timing_of(const Controller&, const RunConditions* = nullptr);
 
 // Everything that can be written for the state that the run is in: a run that did not complete has no
 // surface. `error_field`, when given, is what the picture's second panel shows instead of the fit's

@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <ctime>
+#include <iterator>
 #include <random>
 
 #include "firmware_like/control_loop.hpp"
+#include "firmware_like/control_thread.hpp"
 #include "firmware_like/display.hpp"
 #include "firmware_like/recorder_thread.hpp"
 #include "hal/cable.hpp"
@@ -62,6 +65,15 @@ std::string memory_line(const Controller& controller) {
     line += fmt::format(" {} {:.1f} MiB,", item.subsystem, static_cast<double>(item.plan_bytes) / (1 << 20));
   return line +
          fmt::format(" {:.1f} MiB in all", static_cast<double>(total_plan(controller.memory())) / (1 << 20));
+}
+
+// What the run begins with: how much memory it has planned for, and what the operating system has not given.
+std::string head_lines(const Controller& controller, const RunConditions& conditions) {
+  std::string lines = memory_line(controller);
+  for (const auto& complaint : complaints(conditions.setup)) lines += "\nnot real-time: " + complaint;
+  const Verdict verdict = verdict_on(conditions.environment, conditions.setup, conditions.realtime);
+  if (!verdict.representative) lines += "\ntiming is not representative: " + verdict.why();
+  return lines;
 }
 
 // One line for a run that did not complete: what happened, what is saved where, how to go on.
@@ -169,11 +181,17 @@ int run_cell(const RunOptions& options) {
       *config, clock, *scanner_link, *robot_link,
       ControllerOptions{.archive = folder->archive.get(), .epoch = fresh_epoch()});
   guard.stops(controller->cell());
-  ThreadCounts counts;
+  RunConditions conditions{config->realtime, read_environment(config->realtime.cpu), {}, {}};
   {
+    const ProcessSetup process{config->realtime};
+    ControlThread control{config->realtime, [&] { conditions.control_thread = run_to_rest(*controller); }};
     const RecorderThread recorder{controller->recorder(), *folder->store};
-    const DisplayThread display{controller->cell(), memory_line(*controller)};
-    counts = run_to_rest(*controller);
+    conditions.setup = process.rows();
+    std::ranges::copy(control.setup(), std::back_inserter(conditions.setup));
+    conditions.setup.push_back(check_ordinary_threads(control.id(), config->realtime));
+    const DisplayThread display{controller->cell(), head_lines(*controller, conditions)};
+    control.begin();
+    control.join();
   }
   guard.let_go();
   const int code = exit_code(*controller);
@@ -182,7 +200,7 @@ int run_cell(const RunOptions& options) {
     return complain(why_refused(*controller)), code == exit_aborted ? exit_failed : code;
   }
   const RunLabel label{
-      .plate = config->name, .seed = {}, .begun = begun_of(*folder->store), .control_thread = counts};
+      .plate = config->name, .seed = {}, .begun = begun_of(*folder->store), .conditions = &conditions};
   const Json summary = summary_of(*controller, label);
   if (controller->recorder().store_failed())
     complain(
@@ -207,9 +225,7 @@ int fit_run(const FitOptions& options) {
   const auto controller =
       std::make_unique<Controller>(*config, clock, none.host(), none.host(),
                                    ControllerOptions{.archive = run->archive.get(), .devices = false});
-  controller->start();
-  while (controller->tick()) {
-  }
+  run_to_rest(*controller);
   const RunLabel label{.plate = config->name, .seed = {}, .begun = begun_of(*run->store)};
   const Json summary = summary_of(*controller, label);
   std::error_code failed;

@@ -42,6 +42,13 @@ void TomlSection::integer(std::string_view key, int& value, int min, int max) {
   value = static_cast<int>(v);
 }
 
+void TomlSection::flag(std::string_view key, bool& value) {
+  const toml::node* n = node(key);
+  if (n == nullptr) return;
+  if (!n->is_boolean()) return wrong(*n, key, "true or false is wanted");
+  value = *n->value<bool>();
+}
+
 void TomlSection::text(std::string_view key, std::string& value) {
   const toml::node* n = node(key);
   if (n == nullptr) return;

@@ -24,6 +24,7 @@ class TomlSection {
 
   void number(std::string_view key, double& value, double min, double max);
   void integer(std::string_view key, int& value, int min, int max);
+  void flag(std::string_view key, bool& value);
   void text(std::string_view key, std::string& value);
   void choice(std::string_view key, std::string& value, const std::vector<std::string>& allowed);
   void numbers(std::string_view key, std::span<double> values, double min,

@@ -61,8 +61,10 @@ std::string values(const CellConfig& c) {
                      c.start.head_yaw) +
          fmt::format("{} {} {} {} ", c.tracking_overlap_mm, c.tracking_crossing_deg, c.seek_step_mm,
                      c.seek_limit_mm) +
-         fmt::format("{} {} {} {}", c.scan_overlap_mm, c.scan_margin_mm, c.finest_span_mm,
-                     c.fit_tolerance_mm);
+         fmt::format("{} {} {} {} ", c.scan_overlap_mm, c.scan_margin_mm, c.finest_span_mm,
+                     c.fit_tolerance_mm) +
+         fmt::format("{} {} {} {} {}", c.realtime.lock_memory, c.realtime.heap_reserve_mib,
+                     c.realtime.priority, c.realtime.cpu, c.realtime.cpu_latency_us);
 }
 
 std::string key_of(const std::string& line) { return line.substr(0, line.find(' ')); }
@@ -106,7 +108,12 @@ std::string changed(const std::string& line) {
                                                                          {"seek_limit_mm", "2000"},
                                                                          {"margin_mm", "3"},
                                                                          {"finest_span_mm", "12"},
-                                                                         {"tolerance_mm", "0.01"}};
+                                                                         {"tolerance_mm", "0.01"},
+                                                                         {"lock_memory", "false"},
+                                                                         {"heap_reserve_mib", "8"},
+                                                                         {"priority", "49"},
+                                                                         {"cpu", "0"},
+                                                                         {"cpu_latency_us", "-1"}};
   for (const auto& [key, value] : other) {
     if (key == key_of(line)) return key + " = " + value;
   }
@@ -139,7 +146,7 @@ TEST_CASE("every key of the example is read: another value makes another configu
     other.erase(other.begin() + static_cast<std::ptrdiff_t>(i));
     CHECK(values(parsed(joined(other))) == before);
   }
-  CHECK(keys == 39);
+  CHECK(keys == 44);
   CHECK(fixed == 3);
 }
 
@@ -157,7 +164,8 @@ TEST_CASE("what is wrong is told in one line with file, line, key and what is al
         "cell.toml:3: [robot] bauds: unknown key; known here: baud, device, driver, repeatability_z_mm, "
         "speed_percent, workspace");
   CHECK(refusal("\nrobots = 1\n") ==
-        "cell.toml:2: robots: unknown key; known here: cell, fit, plate, robot, scan, scanner, schema, "
+        "cell.toml:2: robots: unknown key; known here: cell, fit, plate, realtime, robot, scan, scanner, "
+        "schema, "
         "start, tracking");
   CHECK(refusal("[scanner.mount]\nx = 1\n") ==
         "cell.toml:2: [scanner.mount] x: unknown key; known here: translation_mm, zyz_deg");
@@ -178,6 +186,9 @@ TEST_CASE("what is wrong is told in one line with file, line, key and what is al
   CHECK(refusal("[plate]\nthickness_mm = nan\n") ==
         "cell.toml:2: [plate] thickness_mm: nan is outside 0.5 to 200");
   CHECK(refusal("[plate]\nthickness_mm = true\n") == "cell.toml:2: [plate] thickness_mm: a number is wanted");
+  CHECK(refusal("[realtime]\nlock_memory = 1\n") ==
+        "cell.toml:2: [realtime] lock_memory: true or false is wanted");
+  CHECK(refusal("[realtime]\npriority = 99\n") == "cell.toml:2: [realtime] priority: 99 is outside 0 to 98");
   CHECK(refusal("schema = 2\n") == "cell.toml:1: schema: 2 is outside 1 to 1");
   CHECK(refusal("scanner = 3\n") == "cell.toml:1: scanner: a table is wanted");
   CHECK(refusal("[scanner]\nmount = [0, 140, 300]\n") == "cell.toml:2: [scanner] mount: a table is wanted");
@@ -246,6 +257,7 @@ TEST_CASE(
   CHECK(first_difference(text, replaced("4014", "4015")) == "");
   CHECK(first_difference(
             text, "# at the window\n[cell]\nname = \"b\"\n[robot]\ndevice = \"/dev/ttyS1\"\n" + text) == "");
+  CHECK(first_difference(text, "[realtime]\npriority = 20\ncpu = 1\n" + text) == "");
   CHECK(first_difference(text, replaced("yaw_deg = 0", "yaw_deg = 1")) == "start.yaw_deg");
   CHECK(first_difference(text, replaced("[0, 180, 180]", "[0, 180, 181]")) == "scanner.mount.zyz_deg");
   CHECK(first_difference(text, text + "centre_mm = [1, 2, 3]\n") == "start.centre_mm");

@@ -82,4 +82,6 @@ TEST_CASE("the timing report names every row of the task table") {
   CHECK(t["tick_us"] == 1000.0);
   CHECK(t["tasks"][0]["runs"] == 290);  // without the ten of the warm-up
   CHECK(t["background"][0]["name"] == "surface");
+  CHECK(t["representative"] == false);
+  CHECK(t["why"] == "virtual time");
 }

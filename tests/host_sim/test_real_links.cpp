@@ -31,6 +31,10 @@ void check_files(const std::string& folder) {
   CHECK(json::parse(text_of(folder + "/surface.json"))["unit"] == "mm");
   const auto timing = json::parse(text_of(folder + "/timing.json"));
   CHECK(timing["ticks"].get<int>() > 1000);
+  CHECK(timing["environment"]["sysinfo"]["sysname"] == "Linux");
+  CHECK(timing["setup"].size() == 9);
+  CHECK(timing["representative"].get<bool>() == timing["why"].get<std::string>().empty());
+  CHECK(timing["why"] != "virtual time");
   std::istringstream events{text_of(folder + "/events.jsonl")};
   int count = 0;
   for (std::string line; std::getline(events, line); ++count) REQUIRE(json::accept(line));

@@ -1,0 +1,28 @@
+// The conditions of a run as they head its timing report: JSON, with cyclictest's names where they mean the same
+// (sysinfo), and a few lines for a terminal.
+#pragma once
+
+#include "firmware_like/environment.hpp"
+#include "firmware_like/surface_file.hpp"
+#include "firmware_like/thread_counts.hpp"
+
+namespace moldloft::firmware_like {
+
+// Under which conditions a run was timed; a run in virtual time has none.
+struct RunConditions {
+  RealtimeConfig realtime;
+  Environment environment;
+  SetupRows setup;
+  ThreadCounts control_thread = {};  // what the operating system did to it
+};
+
+Json environment_json(const Environment&);
+Json setup_json(const SetupRows&);
+Json counts_json(const ThreadCounts&);
+
+// The keys environment, setup, control_thread, representative and why; for virtual time (null) the last two alone.
+void put_conditions(Json& report, const RunConditions*);
+
+std::string conditions_text(const RunConditions&);
+
+}  // namespace moldloft::firmware_like
