@@ -26,13 +26,14 @@ void sanitizer_looks_away(bool away) noexcept {
 
 MOLDLOFT_EFFECTS_UNCHECKED_BEGIN  // the mark is thread-local, which the compiler takes for something that may wait
 
-PromiseSuspended::PromiseSuspended() noexcept : before_{moldloft_realtime_section} {
+PromiseSuspended::PromiseSuspended() noexcept
+    : before_{moldloft_realtime_section} {
   if (before_ != 0) ++suspended;
   moldloft_realtime_section = 0;
   sanitizer_looks_away(true);
 }
 
-PromiseSuspended::~PromiseSuspended() {
+PromiseSuspended::~PromiseSuspended() noexcept {
   sanitizer_looks_away(false);
   moldloft_realtime_section = before_;
 }

@@ -27,7 +27,7 @@ class RealtimeSection {
 class PromiseSuspended {
  public:
   PromiseSuspended() noexcept MOLDLOFT_NONBLOCKING;
-  ~PromiseSuspended() MOLDLOFT_NONBLOCKING;
+  ~PromiseSuspended() noexcept MOLDLOFT_NONBLOCKING;
   PromiseSuspended(const PromiseSuspended&) = delete;
   PromiseSuspended& operator=(const PromiseSuspended&) = delete;
 

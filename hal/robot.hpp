@@ -13,6 +13,7 @@
 #include "hal/clock.hpp"
 #include "hal/fixed_text.hpp"
 #include "hal/pose.hpp"
+#include "hal/realtime.hpp"
 
 namespace moldloft::hal {
 
@@ -27,12 +28,12 @@ enum class RobotState {
 
 struct RobotEvent {
   enum class Kind {
-    ready,      // synchronised; pose says where the arm stands, calibrated whether it knows that
-    moving,     // the command was checked and motion has started
-    done,       // stopped and settled; pose was read back
-    refused,    // ERR: the controller will not do it; code says why
-    fault,      // e-stop, power loss, watchdog, error during motion; latched
-    lost,       // the link is gone or the robot is silent beyond the limit
+    ready,    // synchronised; pose says where the arm stands, calibrated whether it knows that
+    moving,   // the command was checked and motion has started
+    done,     // stopped and settled; pose was read back
+    refused,  // ERR: the controller will not do it; code says why
+    fault,    // e-stop, power loss, watchdog, error during motion; latched
+    lost,     // the link is gone or the robot is silent beyond the limit
   };
   Kind kind;
   Pose pose{};
@@ -45,19 +46,21 @@ class Robot {
  public:
   virtual ~Robot() = default;
 
-  virtual void start(Instant now) = 0;
-  virtual void receive(Instant now) = 0;
-  virtual void transmit(Instant now) = 0;
+  virtual void start(Instant now) MOLDLOFT_NONBLOCKING = 0;
+  virtual void receive(Instant now) MOLDLOFT_NONBLOCKING = 0;
+  virtual void transmit(Instant now) MOLDLOFT_NONBLOCKING = 0;
 
   // One command at a time: false unless state() is ready. move() drives the tip to `target` at `speed_percent` (1-100).
-  virtual bool move(const Pose& target, int speed_percent, Instant now) = 0;
-  virtual bool calibrate(Instant now) = 0;
-  virtual void stop(Instant now) = 0;   // harmless, at any time: motion ends as fast as the controller allows
-  virtual void reset(Instant now) = 0;  // an operator has cleared the fault: synchronise again
+  virtual bool move(const Pose& target, int speed_percent, Instant now) MOLDLOFT_NONBLOCKING = 0;
+  virtual bool calibrate(Instant now) MOLDLOFT_NONBLOCKING = 0;
+  virtual void stop(Instant now)
+      MOLDLOFT_NONBLOCKING = 0;  // harmless, at any time: motion ends as fast as the controller allows
+  virtual void reset(Instant now)
+      MOLDLOFT_NONBLOCKING = 0;  // an operator has cleared the fault: synchronise again
 
-  virtual std::optional<RobotEvent> next_event() = 0;
-  virtual RobotState state() const = 0;
-  virtual std::string_view why() const = 0;
+  virtual std::optional<RobotEvent> next_event() MOLDLOFT_NONBLOCKING = 0;
+  virtual RobotState state() const MOLDLOFT_NONBLOCKING = 0;
+  virtual std::string_view why() const MOLDLOFT_NONBLOCKING = 0;
 };
 
 }  // namespace moldloft::hal

@@ -21,6 +21,7 @@
 #include <string_view>
 
 #include "hal/clock.hpp"
+#include "hal/realtime.hpp"
 #include "tasks/histogram.hpp"
 
 namespace moldloft::tasks {
@@ -33,7 +34,7 @@ using namespace std::chrono_literals;
 class Task {
  public:
   virtual ~Task() = default;
-  virtual void run(Instant now) = 0;  // `now`: the clock's reading at the task's start
+  virtual void run(Instant now) MOLDLOFT_NONBLOCKING = 0;  // `now`: the clock's reading at the task's start
 };
 
 // A task made of a callable: for the rows of the table that only call one function of a driver.
@@ -41,7 +42,7 @@ template <typename Function>
 class FunctionTask final : public Task {
  public:
   explicit FunctionTask(Function function) : function_{function} {}
-  void run(Instant now) override { function_(now); }
+  void run(Instant now) MOLDLOFT_NONBLOCKING override { function_(now); }
 
  private:
   Function function_;
@@ -50,8 +51,9 @@ class FunctionTask final : public Task {
 class BackgroundTask {
  public:
   virtual ~BackgroundTask() = default;
-  virtual bool has_work() const = 0;
-  virtual void step(Instant deadline) = 0;  // one bounded piece of work; returns well before the deadline
+  virtual bool has_work() const MOLDLOFT_NONBLOCKING = 0;
+  virtual void step(Instant deadline)
+      MOLDLOFT_NONBLOCKING = 0;  // one bounded piece of work; returns well before the deadline
 };
 
 enum class Criticality { vital, ordinary };  // an overrun of a vital task counts towards the limit of misses
@@ -135,10 +137,10 @@ class Scheduler {
   const SchedulerSettings& settings() const { return settings_; }
 
  private:
-  void run_table(Instant tick_start, Instant& t);
-  void run_background(Instant& t, Instant limit);
-  bool step_background(std::size_t i, Instant& t, Instant limit);
-  bool count_missed(Instant t);
+  void run_table(Instant tick_start, Instant& t) MOLDLOFT_NONBLOCKING;
+  void run_background(Instant& t, Instant limit) MOLDLOFT_NONBLOCKING;
+  bool step_background(std::size_t i, Instant& t, Instant limit) MOLDLOFT_NONBLOCKING;
+  bool count_missed(Instant t) MOLDLOFT_NONBLOCKING;
   bool warm() const noexcept { return ticks_ > settings_.warm_up_ticks; }
 
   Clock& clock_;

@@ -12,6 +12,7 @@
 #include "geometry/edges/boundary_view.hpp"
 #include "geometry/edges/plate_runs.hpp"
 #include "hal/frame.hpp"
+#include "hal/realtime.hpp"
 
 namespace moldloft::tasks {
 
@@ -29,8 +30,8 @@ class ShotView {
 
   // Looks at a frame, which must stay as it is; `hint` is a point on the plate, good to `reach_mm`.
   // In bounded pieces: begin(), then step() until it says true, then found() and the rest may be asked.
-  void begin(const hal::Frame& frame, const Eigen::Vector3d& hint, double reach_mm);
-  bool step();
+  void begin(const hal::Frame& frame, const Eigen::Vector3d& hint, double reach_mm) MOLDLOFT_NONBLOCKING;
+  bool step() MOLDLOFT_NONBLOCKING;
   bool found() const { return !runs_.empty(); }
 
   const geometry::BoundaryViewer::View& boundary() const { return boundary_; }
@@ -38,8 +39,8 @@ class ShotView {
 
   // Walks through the good points on the plate, away from its edges. next() fills `out` with as many as fit and returns
   // how many; 0 when all have been given. Takes every `stride`-th stripe and point.
-  void rewind(std::uint32_t stride);
-  std::size_t next(std::span<Eigen::Vector3d> out);
+  void rewind(std::uint32_t stride) MOLDLOFT_NONBLOCKING;
+  std::size_t next(std::span<Eigen::Vector3d> out) MOLDLOFT_NONBLOCKING;
 
   std::size_t bytes() const;
 

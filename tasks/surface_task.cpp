@@ -1,5 +1,7 @@
 #include "tasks/surface_task.hpp"
 
+#include "hal/reserved.hpp"
+
 #include <algorithm>
 
 namespace moldloft::tasks {
@@ -29,10 +31,10 @@ void SurfaceTask::keep(ShotView& shot, const geometry::RigidMotion& world_from_s
   while (room > 0) {
     const std::size_t count = shot.next(std::span{chunk_}.first(std::min(room, chunk_.size())));
     if (count == 0) break;
-    for (std::size_t i = 0; i < count; ++i) reserve_.push_back(world_from_scanner * chunk_[i]);
+    for (std::size_t i = 0; i < count; ++i) hal::add_within_reserve(reserve_, world_from_scanner * chunk_[i]);
     room -= count;
   }
-  reserve_ends_.push_back(reserve_.size());
+  hal::add_within_reserve(reserve_ends_, reserve_.size());
 }
 
 void SurfaceTask::build_outline(std::span<const Eigen::Vector2d> edges,

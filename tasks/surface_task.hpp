@@ -20,8 +20,9 @@
 #include "geometry/edges/corner_choice.hpp"
 #include "geometry/edges/outline.hpp"
 #include "geometry/fit/plan_map.hpp"
-#include "geometry/rigid_motion.hpp"
 #include "geometry/fit/surface_fit.hpp"
+#include "geometry/rigid_motion.hpp"
+#include "hal/realtime.hpp"
 #include "tasks/scheduler.hpp"
 #include "tasks/shot_view.hpp"
 
@@ -53,18 +54,18 @@ class SurfaceTask final : public BackgroundTask {
 
   explicit SurfaceTask(const SurfaceTaskSettings&);
 
-  void begin();
+  void begin() MOLDLOFT_NONBLOCKING;
   // Keeps a thinned copy of the plate's points of a boundary shot. At once: 3,000 points take about 50 us.
-  void keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner);
+  void keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner) MOLDLOFT_NONBLOCKING;
   // Looks at the frame that `shot` has begun; looking() turns false when its view is there. Goes before all else.
   void look(ShotView& shot) { looking_at_ = &shot; }
   bool looking() const { return looking_at_ != nullptr; }
   // `corner_candidates`: what the tracker took for corners; more than four is no harm.
   void build_outline(std::span<const Eigen::Vector2d> edges,
-                     std::span<const Eigen::Vector2d> corner_candidates);
+                     std::span<const Eigen::Vector2d> corner_candidates) MOLDLOFT_NONBLOCKING;
   // Folds a surface shot in; `shot` and its frame stay untouched by others until stage() is open again.
-  void fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner);
-  void solve();
+  void fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner) MOLDLOFT_NONBLOCKING;
+  void solve() MOLDLOFT_NONBLOCKING;
 
   bool has_work() const override;
   void step(Instant deadline) override;

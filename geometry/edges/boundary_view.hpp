@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "geometry/edges/plate_runs.hpp"
+#include "geometry/nonblocking.hpp"
 
 namespace moldloft::geometry {
 
@@ -66,7 +67,7 @@ class BoundaryViewer {
     std::optional<double> hidden_low_x_mm, hidden_high_x_mm;
   };
   View look(std::span<const PlateRun> runs, std::size_t stripe_count,
-            const BoundaryViewSettings&);  // valid until the next call
+            const BoundaryViewSettings&) MOLDLOFT_GEOMETRY_NONBLOCKING;  // valid until the next call
 
   std::size_t bytes() const;
 

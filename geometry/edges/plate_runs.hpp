@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "geometry/error.hpp"
+#include "geometry/nonblocking.hpp"
 
 namespace moldloft::geometry {
 
@@ -73,10 +74,11 @@ class PlateRunFinder {
 
   // The same in bounded pieces: begin(), cut_stripes() until it says true (4 us a stripe), finish(). The
   // stripes are the caller's and must stay until then.
-  std::expected<void, Error> begin(std::span<const StripeView> stripes);
-  std::expected<bool, Error> cut_stripes(std::size_t at_most, const PlateRunSettings& settings);
-  std::expected<std::span<const PlateRun>, Error> finish(const Eigen::Vector3d& hint,
-                                                         const PlateRunSettings& settings);
+  std::expected<void, Error> begin(std::span<const StripeView> stripes) MOLDLOFT_GEOMETRY_NONBLOCKING;
+  std::expected<bool, Error> cut_stripes(std::size_t at_most,
+                                         const PlateRunSettings& settings) MOLDLOFT_GEOMETRY_NONBLOCKING;
+  std::expected<std::span<const PlateRun>, Error> finish(
+      const Eigen::Vector3d& hint, const PlateRunSettings& settings) MOLDLOFT_GEOMETRY_NONBLOCKING;
 
   std::size_t bytes() const;
 

@@ -46,7 +46,8 @@ class Devices {
   ChildProcess child_;
 };
 
-inline std::vector<std::string> run_words(const Devices& devices, const std::string& out, bool resume = false) {
+inline std::vector<std::string> run_words(const Devices& devices, const std::string& out,
+                                          bool resume = false) {
   std::vector<std::string> words = {MOLDLOFT, "run", devices.config(), "--out", out};
   if (resume) words.push_back("--resume");
   return words;

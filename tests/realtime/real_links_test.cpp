@@ -25,7 +25,9 @@ bool memory_can_be_locked() {
   return can;
 }
 
-int faults(const json& counts) { return counts["minor_faults"].get<int>() + counts["major_faults"].get<int>(); }
+int faults(const json& counts) {
+  return counts["minor_faults"].get<int>() + counts["major_faults"].get<int>();
+}
 
 struct GuardedRun {
   json report, counts;
@@ -42,7 +44,8 @@ GuardedRun guarded_run(const std::string& breaking = {}) {
   words.insert(words.end(), run.begin(), run.end());
   ChildProcess child{words};
   REQUIRE_MESSAGE(child.wait(run_limit) == firmware_like::exit_done, child.err());
-  GuardedRun result{json_in(folder.file("report")), json_in(folder.file("run") + "/timing.json")["control_thread"]};
+  GuardedRun result{json_in(folder.file("report")),
+                    json_in(folder.file("run") + "/timing.json")["control_thread"]};
   if (breaking.empty()) CHECK_MESSAGE(result.report["all"] == 0, child.err());
   return result;
 }

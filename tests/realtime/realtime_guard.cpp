@@ -41,21 +41,21 @@ namespace {
 
 constexpr std::array<std::string_view, 70> names = {
     // the heap, and memory from the kernel
-    "malloc", "calloc", "realloc", "memalign", "aligned_alloc", "posix_memalign", "free", "mmap", "munmap", "mprotect",
-    "madvise",
+    "malloc", "calloc", "realloc", "memalign", "aligned_alloc", "posix_memalign", "free", "mmap", "munmap",
+    "mprotect", "madvise",
     // locks and what waits for other threads
     "pthread_mutex_lock", "pthread_mutex_trylock", "pthread_mutex_timedlock", "pthread_rwlock_rdlock",
     "pthread_rwlock_wrlock", "pthread_spin_lock", "pthread_cond_wait", "pthread_cond_timedwait",
-    "pthread_cond_clockwait", "pthread_barrier_wait", "pthread_once", "pthread_create", "pthread_join", "sem_wait",
-    "sem_timedwait", "__cxa_guard_acquire", "syscall", "sched_yield",
+    "pthread_cond_clockwait", "pthread_barrier_wait", "pthread_once", "pthread_create", "pthread_join",
+    "sem_wait", "sem_timedwait", "__cxa_guard_acquire", "syscall", "sched_yield",
     // sleeps
     "nanosleep", "usleep", "sleep", "clock_nanosleep", "poll", "ppoll", "select", "pselect", "epoll_wait",
     // descriptors that wait
-    "read", "readv", "pread", "recv", "recvfrom", "recvmsg", "write", "writev", "pwrite", "send", "sendto", "sendmsg",
-    "accept", "connect",
+    "read", "readv", "pread", "recv", "recvfrom", "recvmsg", "write", "writev", "pwrite", "send", "sendto",
+    "sendmsg", "accept", "connect",
     // files and names
-    "open", "open64", "openat", "close", "fopen", "fopen64", "fclose", "fread", "fwrite", "fputs", "puts", "printf",
-    "fprintf", "fflush", "fsync", "fdatasync", "getaddrinfo", "dlopen"};
+    "open", "open64", "openat", "close", "fopen", "fopen64", "fclose", "fread", "fwrite", "fputs", "puts",
+    "printf", "fprintf", "fflush", "fsync", "fdatasync", "getaddrinfo", "dlopen"};
 
 consteval std::size_t index_of(std::string_view name) {
   for (std::size_t i = 0; i < names.size(); ++i)
@@ -75,7 +75,8 @@ void count(std::size_t function) noexcept {
   if (before > 0) return;
   looking_away = true;
   std::array<void*, 32> frames{};
-  backtrace_symbols_fd(frames.data(), backtrace(frames.data(), static_cast<int>(frames.size())), STDERR_FILENO);
+  backtrace_symbols_fd(frames.data(), backtrace(frames.data(), static_cast<int>(frames.size())),
+                       STDERR_FILENO);
   looking_away = false;
 }
 
@@ -96,7 +97,8 @@ bool is_zero(const timeval* t) { return t != nullptr && t->tv_sec == 0 && t->tv_
 template <typename F>
 F* following(F*& kept, const char* name) noexcept {
   if (kept != nullptr) return kept;
-  const bool before = std::exchange(looking_away, true);  // a symbol that is not there costs memory for the error
+  const bool before =
+      std::exchange(looking_away, true);  // a symbol that is not there costs memory for the error
   void* found = dlvsym(RTLD_NEXT, name, "GLIBC_2.3.2");
   if (found == nullptr) found = dlsym(RTLD_NEXT, name);
   kept = reinterpret_cast<F*>(found);
@@ -107,12 +109,12 @@ F* following(F*& kept, const char* name) noexcept {
 }  // namespace
 
 // A function that counts when `condition` holds, and then does what it always did.
-#define GUARDED_IF(condition, result, name, parameters, arguments)  \
-  extern "C" result name parameters {                               \
-    using Real = result parameters;                                 \
-    constinit static Real* kept = nullptr;                          \
-    if (condition) count(index_of(#name));                          \
-    return following(kept, #name) arguments;                        \
+#define GUARDED_IF(condition, result, name, parameters, arguments) \
+  extern "C" result name parameters {                              \
+    using Real = result parameters;                                \
+    constinit static Real* kept = nullptr;                         \
+    if (condition) count(index_of(#name));                         \
+    return following(kept, #name) arguments;                       \
   }
 #define GUARDED(result, name, parameters, arguments) GUARDED_IF(true, result, name, parameters, arguments)
 
@@ -155,7 +157,8 @@ void free(void* memory) {
 }
 }
 
-GUARDED(void*, mmap, (void* at, std::size_t n, int prot, int flags, int fd, off_t from), (at, n, prot, flags, fd, from))
+GUARDED(void*, mmap, (void* at, std::size_t n, int prot, int flags, int fd, off_t from),
+        (at, n, prot, flags, fd, from))
 GUARDED(int, munmap, (void* at, std::size_t n), (at, n))
 GUARDED(int, mprotect, (void* at, std::size_t n, int prot), (at, n, prot))
 GUARDED(int, madvise, (void* at, std::size_t n, int advice), (at, n, advice))
@@ -167,12 +170,15 @@ GUARDED(int, pthread_rwlock_rdlock, (pthread_rwlock_t * l), (l))
 GUARDED(int, pthread_rwlock_wrlock, (pthread_rwlock_t * l), (l))
 GUARDED(int, pthread_spin_lock, (pthread_spinlock_t * l), (l))
 GUARDED(int, pthread_cond_wait, (pthread_cond_t * c, pthread_mutex_t* m), (c, m))
-GUARDED(int, pthread_cond_timedwait, (pthread_cond_t * c, pthread_mutex_t* m, const timespec* until), (c, m, until))
-GUARDED(int, pthread_cond_clockwait, (pthread_cond_t * c, pthread_mutex_t* m, clockid_t clock, const timespec* until),
+GUARDED(int, pthread_cond_timedwait, (pthread_cond_t * c, pthread_mutex_t* m, const timespec* until),
+        (c, m, until))
+GUARDED(int, pthread_cond_clockwait,
+        (pthread_cond_t * c, pthread_mutex_t* m, clockid_t clock, const timespec* until),
         (c, m, clock, until))
 GUARDED(int, pthread_barrier_wait, (pthread_barrier_t * b), (b))
 GUARDED(int, pthread_once, (pthread_once_t * once, void (*work)()), (once, work))
-GUARDED(int, pthread_create, (pthread_t * thread, const pthread_attr_t* how, void* (*work)(void*), void* with),
+GUARDED(int, pthread_create,
+        (pthread_t * thread, const pthread_attr_t* how, void* (*work)(void*), void* with),
         (thread, how, work, with))
 GUARDED(int, pthread_join, (pthread_t thread, void** result), (thread, result))
 GUARDED(int, sem_wait, (sem_t * s), (s))
@@ -184,26 +190,29 @@ GUARDED(int, nanosleep, (const timespec* t, timespec* left), (t, left))
 GUARDED(int, usleep, (useconds_t t), (t))
 GUARDED(unsigned, sleep, (unsigned t), (t))
 GUARDED_IF(timeout != 0, int, poll, (pollfd * fds, nfds_t n, int timeout), (fds, n, timeout))
-GUARDED_IF(!is_zero(timeout), int, ppoll, (pollfd * fds, nfds_t n, const timespec* timeout, const sigset_t* mask),
-           (fds, n, timeout, mask))
+GUARDED_IF(!is_zero(timeout), int, ppoll,
+           (pollfd * fds, nfds_t n, const timespec* timeout, const sigset_t* mask), (fds, n, timeout, mask))
 GUARDED_IF(!is_zero(timeout), int, select, (int n, fd_set* r, fd_set* w, fd_set* e, timeval* timeout),
            (n, r, w, e, timeout))
 GUARDED_IF(!is_zero(timeout), int, pselect,
            (int n, fd_set* r, fd_set* w, fd_set* e, const timespec* timeout, const sigset_t* mask),
            (n, r, w, e, timeout, mask))
-GUARDED_IF(timeout != 0, int, epoll_wait, (int fd, epoll_event* events, int n, int timeout), (fd, events, n, timeout))
+GUARDED_IF(timeout != 0, int, epoll_wait, (int fd, epoll_event* events, int n, int timeout),
+           (fd, events, n, timeout))
 
 GUARDED_IF(waits(fd), ssize_t, read, (int fd, void* to, std::size_t n), (fd, to, n))
 GUARDED_IF(waits(fd), ssize_t, readv, (int fd, const iovec* to, int n), (fd, to, n))
 GUARDED_IF(waits(fd), ssize_t, pread, (int fd, void* to, std::size_t n, off_t at), (fd, to, n, at))
 GUARDED_IF(waits(fd, flags), ssize_t, recv, (int fd, void* to, std::size_t n, int flags), (fd, to, n, flags))
 GUARDED_IF(waits(fd, flags), ssize_t, recvfrom,
-           (int fd, void* to, std::size_t n, int flags, sockaddr* from, socklen_t* size), (fd, to, n, flags, from, size))
+           (int fd, void* to, std::size_t n, int flags, sockaddr* from, socklen_t* size),
+           (fd, to, n, flags, from, size))
 GUARDED_IF(waits(fd, flags), ssize_t, recvmsg, (int fd, msghdr* to, int flags), (fd, to, flags))
 GUARDED_IF(waits(fd), ssize_t, write, (int fd, const void* from, std::size_t n), (fd, from, n))
 GUARDED_IF(waits(fd), ssize_t, writev, (int fd, const iovec* from, int n), (fd, from, n))
 GUARDED_IF(waits(fd), ssize_t, pwrite, (int fd, const void* from, std::size_t n, off_t at), (fd, from, n, at))
-GUARDED_IF(waits(fd, flags), ssize_t, send, (int fd, const void* from, std::size_t n, int flags), (fd, from, n, flags))
+GUARDED_IF(waits(fd, flags), ssize_t, send, (int fd, const void* from, std::size_t n, int flags),
+           (fd, from, n, flags))
 GUARDED_IF(waits(fd, flags), ssize_t, sendto,
            (int fd, const void* from, std::size_t n, int flags, const sockaddr* to, socklen_t size),
            (fd, from, n, flags, to, size))
@@ -216,7 +225,8 @@ GUARDED(FILE*, fopen, (const char* path, const char* how), (path, how))
 GUARDED(FILE*, fopen64, (const char* path, const char* how), (path, how))
 GUARDED(int, fclose, (FILE * file), (file))
 GUARDED(std::size_t, fread, (void* to, std::size_t size, std::size_t n, FILE* file), (to, size, n, file))
-GUARDED(std::size_t, fwrite, (const void* from, std::size_t size, std::size_t n, FILE* file), (from, size, n, file))
+GUARDED(std::size_t, fwrite, (const void* from, std::size_t size, std::size_t n, FILE* file),
+        (from, size, n, file))
 GUARDED(int, fputs, (const char* text, FILE* file), (text, file))
 GUARDED(int, puts, (const char* text), (text))
 GUARDED(int, fflush, (FILE * file), (file))
@@ -227,16 +237,16 @@ GUARDED(int, getaddrinfo, (const char* host, const char* port, const addrinfo* h
 GUARDED(void*, dlopen, (const char* path, int how), (path, how))
 
 // Those with an open end.
-#define GUARDED_OPEN(name, parameters, arguments)                     \
-  extern "C" int name parameters {                                    \
-    using Real = int(const char*, int, ...);                          \
-    constinit static Real* kept = nullptr;                            \
-    std::va_list more;                                                \
-    va_start(more, flags);                                            \
-    const mode_t mode = va_arg(more, mode_t);                         \
-    va_end(more);                                                     \
-    count(index_of(#name));                                           \
-    return following(kept, #name) arguments;                          \
+#define GUARDED_OPEN(name, parameters, arguments) \
+  extern "C" int name parameters {                \
+    using Real = int(const char*, int, ...);      \
+    constinit static Real* kept = nullptr;        \
+    std::va_list more;                            \
+    va_start(more, flags);                        \
+    const mode_t mode = va_arg(more, mode_t);     \
+    va_end(more);                                 \
+    count(index_of(#name));                       \
+    return following(kept, #name) arguments;      \
   }
 GUARDED_OPEN(open, (const char* path, int flags, ...), (path, flags, mode))
 GUARDED_OPEN(open64, (const char* path, int flags, ...), (path, flags, mode))
@@ -298,7 +308,8 @@ void break_rule(std::string_view how) {
   }
   const timespec moment{.tv_sec = 0, .tv_nsec = 1000};
   if (how == "sleep") nanosleep(&moment, nullptr);
-  if (how == "write") [[maybe_unused]] const auto written = write(STDERR_FILENO, "", 0);
+  if (how == "write") [[maybe_unused]]
+    const auto written = write(STDERR_FILENO, "", 0);
   // Pages that nobody has touched, though memory is locked: as a stack is that grows, or a mapping of the kernel's. The
   // calls that make them do not count.
   if (how == "fault") {
@@ -346,7 +357,8 @@ namespace {
   if (file == nullptr) return;
   unsigned long all = 0;
   for (const auto& c : counts) all += c;
-  std::fprintf(file, "{\"sleeps\": %lu, \"asked\": %lu, \"all\": %lu, \"calls\": {", slept.load(), asked.load(), all);
+  std::fprintf(file, "{\"sleeps\": %lu, \"asked\": %lu, \"all\": %lu, \"calls\": {", slept.load(),
+               asked.load(), all);
   for (std::size_t i = 0; i < names.size(); ++i)
     std::fprintf(file, "%s\"%s\": %lu", i == 0 ? "" : ", ", names[i].data(), counts[i].load());
   std::fprintf(file, "}}\n");

@@ -1,10 +1,10 @@
 // Breaks the promise of a real-time section on purpose, in the way that its argument names, so that tests can see each
 // guard fail. `all` does everything that the preloaded guard knows, each thing at least once; `allowed` what the
 // control thread may do; `outside` everything, but beside the section.
+#include <dlfcn.h>
 #include <fcntl.h>
 #include <malloc.h>
 #include <netdb.h>
-#include <dlfcn.h>
 #include <poll.h>
 #include <pthread.h>
 #include <semaphore.h>
