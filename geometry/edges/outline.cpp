@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-// Vectors grow within what their constructor has reserved, and matrices of a size known only at run time have their most
-// in their type: the compiler cannot know.
+// Vectors grow within what their constructor has reserved, and matrices of a size known only at run time have
+// their most in their type: the compiler cannot know.
 MOLDLOFT_GEOMETRY_CHECKED_AT_RUN_TIME
 
 namespace moldloft::geometry {
