@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "firmware_like/memory_plan.hpp"
+#include "firmware_like/task_table.hpp"
 #include "firmware_like/toml_section.hpp"
 
 namespace moldloft::firmware_like {
@@ -85,8 +86,14 @@ void read_rest(TomlSection& file, CellConfig& c) {
   TomlSection cell = file.section("cell");
   cell.text("name", c.name);
   int tick_us = static_cast<int>(c.tick.count() / 1000);
-  cell.integer("tick_us", tick_us, 100, 100000);
+  cell.integer("tick_us", tick_us, static_cast<int>(shortest_tick.count() / 1000), 100000);
   c.tick = std::chrono::microseconds{tick_us};
+  std::string missed{"skip"};
+  cell.choice("missed_ticks", missed, {"skip", "catch_up_once", "reanchor", "stop"});
+  c.missed_ticks = missed == "skip"            ? tasks::MissedTickPolicy::skip_keep_phase
+                   : missed == "catch_up_once" ? tasks::MissedTickPolicy::catch_up_once
+                   : missed == "reanchor"      ? tasks::MissedTickPolicy::reanchor
+                                               : tasks::MissedTickPolicy::stop;
   double timeout_s = std::chrono::duration<double>(c.device_timeout).count();
   cell.number("device_timeout_s", timeout_s, 0.1, 3600);
   c.device_timeout = std::chrono::duration_cast<hal::Duration>(std::chrono::duration<double>(timeout_s));

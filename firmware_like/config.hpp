@@ -49,6 +49,7 @@ struct CellConfig {
   std::string path, text;  // where it came from and as it stood there; kept in the run store
   std::string name = "cell";
   hal::Duration tick = std::chrono::milliseconds{1};
+  tasks::MissedTickPolicy missed_ticks = tasks::MissedTickPolicy::skip_keep_phase;
   hal::Duration device_timeout = std::chrono::seconds{10};
   ScannerConfig scanner;
   RobotConfig robot;

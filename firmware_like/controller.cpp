@@ -1,6 +1,10 @@
 #include "firmware_like/controller.hpp"
 
+#include <array>
+#include <utility>
+
 #include "firmware_like/drivers.hpp"
+#include "firmware_like/task_table.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -38,7 +42,8 @@ hal::Recorder::Sizes recorder_sizes(const CellConfig& c) {
 Controller::Controller(const CellConfig& config, hal::Clock& clock, hal::ByteLink& scanner_link,
                        hal::ByteLink& robot_link, const ControllerOptions& options)
     : config_{config},
-      recorder_{recorder_sizes(config)},
+      clock_{clock},
+      recorder_{recorder_sizes(config), &flight_},
       scanner_link_{scanner_link, hal::LinkId::scanner, recorder_, clock},
       robot_link_{robot_link, hal::LinkId::robot, recorder_, clock},
       scanner_{make_scanner(config.scanner, scanner_link_)},
@@ -50,17 +55,11 @@ Controller::Controller(const CellConfig& config, hal::Clock& clock, hal::ByteLin
       transmit_robot_{Row{this, &Controller::transmit_robot}},
       transmit_scanner_{Row{this, &Controller::transmit_scanner}},
       health_{Row{this, &Controller::watch_health}},
-      scheduler_{clock, {.tick = config.tick}} {
-  // The order of the rows is the order in a tick: bytes in, decide, bytes out, look after ourselves.
-  scheduler_.add({.name = "scanner in", .budget = 200us}, receive_scanner_);
-  scheduler_.add({.name = "robot in", .budget = 50us}, receive_robot_);
-  scheduler_.add({.name = "cell", .budget = 300us}, cell_);
-  scheduler_.add({.name = "robot out", .budget = 50us}, transmit_robot_);
-  scheduler_.add({.name = "scanner out", .budget = 50us}, transmit_scanner_);
-  scheduler_.add(
-      {.name = "health", .period_ticks = 100, .budget = 20us, .criticality = tasks::Criticality::ordinary},
-      health_);
-  scheduler_.add_background({.name = "surface", .quantum = 200us}, surface_);
+      scheduler_{clock, {.tick = config.tick, .missed = config.missed_ticks}, &flight_} {
+  const std::array<tasks::Task*, task_table.size()> rows{&receive_scanner_, &receive_robot_,    &cell_,
+                                                         &transmit_robot_,  &transmit_scanner_, &health_};
+  for (std::size_t i = 0; i < rows.size(); ++i) scheduler_.add(task_table[i], *rows[i]);
+  scheduler_.add_background(surface_work, surface_);
 }
 
 void Controller::start() {
@@ -68,7 +67,33 @@ void Controller::start() {
   scheduler_.start();
 }
 
-bool Controller::tick() { return scheduler_.run_tick() && !at_rest(); }
+bool Controller::tick() {
+  // The policy `stop` ends what the cell does, not the ticks: the arm has to be told, and the records saved.
+  if (!scheduler_.run_tick()) cell_.abort(missed_tick_text());
+  if (cell_.state() == tasks::CellState::aborting || cell_.state() == tasks::CellState::aborted)
+    report_abort();
+  return !at_rest();
+}
+
+hal::Message Controller::missed_tick_text() const {
+  const auto& miss = scheduler_.last_miss();
+  return hal::Message::format(
+      "{} ticks missed at {:.3f} s, {} ({}), and missed_ticks is \"stop\": clear when the cell is safe",
+      miss.lost, std::chrono::duration<double>(miss.at).count(), tasks::to_string(miss.cause),
+      scheduler_.name_of(miss.task));
+}
+
+// The flight recorder keeps what led to the first abort.
+void Controller::report_abort() {
+  if (std::exchange(abort_reported_, true)) return;
+  flight_.trigger(hal::FlightCause::abort, tasks::Scheduler::no_task, clock_.now());
+}
+
+// The clock is read once more only in the tick that sends what a frame has decided.
+void Controller::transmit_robot(hal::Instant now) {
+  robot_->transmit(now);
+  if (cell_.waits_for_sending()) cell_.commands_sent(clock_.now());
+}
 
 // A cell that holds for a person has come to rest as far as one run of the program goes: what to do is in why().
 bool Controller::at_rest() const {
@@ -88,7 +113,7 @@ void Controller::watch_health(hal::Instant) {
   if (scheduler_.misses_in_a_row() <= max_misses_in_a_row) return;
   cell_.abort(hal::Message::format(
       "{} ticks in a row came too late (last cause: {}): give the controller a core of its own",
-      scheduler_.misses_in_a_row(), scheduler_.name_of(scheduler_.last_miss_cause())));
+      scheduler_.misses_in_a_row(), scheduler_.name_of(scheduler_.last_miss().task)));
 }
 
 MemoryPlan Controller::memory() const {
@@ -100,6 +125,7 @@ MemoryPlan Controller::memory() const {
       {"boundary reserve", surface_.reserve_bytes(), surface_.reserve_used_bytes()},
       fixed("surface fit", surface_.fit_bytes()),
       fixed("scheduler", sizeof(tasks::Scheduler)),
+      fixed("flight recorder", flight_.plan_bytes()),
   };
 }
 

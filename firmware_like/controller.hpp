@@ -13,6 +13,7 @@
 
 #include "firmware_like/config.hpp"
 #include "firmware_like/memory_plan.hpp"
+#include "hal/flight_recorder.hpp"
 #include "hal/line_robot.hpp"
 #include "hal/psc_scanner.hpp"
 #include "hal/recorder.hpp"
@@ -44,6 +45,7 @@ class Controller {
   const tasks::Scheduler& scheduler() const { return scheduler_; }
   hal::Recorder& recorder() { return recorder_; }
   const hal::Recorder& recorder() const { return recorder_; }
+  hal::FlightRecorder& flight() { return flight_; }
   MemoryPlan memory() const;
 
  private:
@@ -55,11 +57,15 @@ class Controller {
   using RowTask = tasks::FunctionTask<Row>;
   void receive_scanner(hal::Instant now) { scanner_->receive(now); }
   void receive_robot(hal::Instant now) { robot_->receive(now); }
-  void transmit_robot(hal::Instant now) { robot_->transmit(now); }
+  void transmit_robot(hal::Instant now);
   void transmit_scanner(hal::Instant now) { scanner_->transmit(now); }
   void watch_health(hal::Instant now);
+  hal::Message missed_tick_text() const;
+  void report_abort();
 
   CellConfig config_;
+  hal::Clock& clock_;
+  hal::FlightRecorder flight_;
   hal::Recorder recorder_;
   hal::TappedLink scanner_link_, robot_link_;
   std::unique_ptr<hal::Scanner> scanner_;
@@ -68,6 +74,7 @@ class Controller {
   tasks::Cell cell_;
   RowTask receive_scanner_, receive_robot_, transmit_robot_, transmit_scanner_, health_;
   tasks::Scheduler scheduler_;
+  bool abort_reported_ = false;
 };
 
 }  // namespace moldloft::firmware_like

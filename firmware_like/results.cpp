@@ -41,9 +41,11 @@ Json histogram_json(const tasks::Histogram& h) {
   return {{"count", h.count()},
           {"min_us", micros(h.min())},
           {"avg_us", micros(h.mean())},
+          {"stddev_us", micros(h.standard_deviation())},
           {"p50_us", micros(h.percentile(0.5))},
           {"p99_us", micros(h.percentile(0.99))},
           {"p999_us", micros(h.percentile(0.999))},
+          {"p9999_us", micros(h.percentile(0.9999))},
           {"max_us", micros(h.max())},
           {"overflows", h.overflows()}};
 }
@@ -109,16 +111,34 @@ Json timing_of(const Controller& c, const RunConditions* conditions) {
   j["tick_us"] = micros(s.settings().tick);
   j["ticks"] = s.ticks();
   j["missed_ticks"] = s.missed_ticks();
-  j["last_miss_cause"] = s.missed_ticks() > 0 ? std::string{s.name_of(s.last_miss_cause())} : std::string{};
+  j["missed_by_cause"] = Json::object();
+  for (const auto cause :
+       {tasks::MissCause::woken_late, tasks::MissCause::preempted, tasks::MissCause::computing})
+    j["missed_by_cause"][std::string{tasks::to_string(cause)}] = s.missed_by(cause);
+  j["first_misses"] = Json::array();
+  for (const auto& m : s.first_misses())
+    j["first_misses"].push_back({{"tick", m.tick},
+                                 {"t_ms", std::chrono::duration<double, std::milli>(m.at).count()},
+                                 {"lost", m.lost},
+                                 {"cause", std::string{tasks::to_string(m.cause)}},
+                                 {"task", std::string{s.name_of(m.task)}},
+                                 {"late_us", micros(m.late)},
+                                 {"tick_took_us", micros(m.wall)},
+                                 {"of_that_on_the_processor_us", micros(m.spent)}});
   j["wake_up"] = histogram_json(s.wake_up());
+  j["execution"] = histogram_json(s.execution());
   j["slack"] = histogram_json(s.slack());
+  j["pushed_by_background"] = histogram_json(s.pushed());
   j["frame_to_command"] = histogram_json(c.cell().frame_to_command());
+  j["data_age"] = histogram_json(c.cell().data_age());
   for (const auto& t : s.tasks()) {
     j["tasks"].push_back({{"name", std::string{t.spec.name}},
                           {"period_ticks", t.spec.period_ticks},
                           {"budget_us", micros(t.spec.budget)},
                           {"runs", t.runs},
+                          {"slips", t.slips},
                           {"late_starts", t.late_starts},
+                          {"lateness_us", micros(t.lateness)},
                           {"overruns", t.overruns},
                           {"cost", histogram_json(t.cost)}});
   }

@@ -6,17 +6,19 @@
 namespace moldloft::hal {
 namespace {
 
-Duration monotonic() noexcept {
+Duration reading_of(clockid_t clock) noexcept {
   timespec t{};
-  answered_at_once([&] { clock_gettime(CLOCK_MONOTONIC, &t); });  // read from memory that the kernel shares
+  answered_at_once([&] { clock_gettime(clock, &t); });  // shared memory, or a short system call
   return std::chrono::seconds{t.tv_sec} + std::chrono::nanoseconds{t.tv_nsec};
 }
 
 }  // namespace
 
-SteadyClock::SteadyClock() noexcept : start_{monotonic()} {}
+SteadyClock::SteadyClock() noexcept : start_{reading_of(CLOCK_MONOTONIC)} {}
 
-Instant SteadyClock::now() noexcept { return monotonic() - start_; }
+Instant SteadyClock::now() noexcept { return reading_of(CLOCK_MONOTONIC) - start_; }
+
+Duration SteadyClock::thread_time() noexcept { return reading_of(CLOCK_THREAD_CPUTIME_ID); }
 
 void SteadyClock::sleep_until(Instant wake) noexcept {
   const auto absolute = wake + start_;

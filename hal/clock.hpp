@@ -24,6 +24,11 @@ class Clock {
   virtual Instant now() noexcept MOLDLOFT_NONBLOCKING = 0;
   virtual void sleep_until(Instant wake) noexcept = 0;  // returns at once when `wake` has passed
 
+  // What the calling thread has spent on the processor, from any origin: the difference of two readings, beside that of
+  // now(), tells how long the thread was ready and did not run. Costs more than now(). Where time is not real nobody
+  // is ever preempted.
+  virtual Duration thread_time() noexcept MOLDLOFT_NONBLOCKING { return now(); }
+
   // Says that work of this declared cost has just been done. A real clock has seen it pass and ignores the call; a
   // virtual clock moves by it, so that a simulated tick costs what its tasks declare.
   virtual void charge(Duration) noexcept MOLDLOFT_NONBLOCKING {}
@@ -35,6 +40,7 @@ class SteadyClock final : public Clock {
   SteadyClock() noexcept;
   Instant now() noexcept MOLDLOFT_NONBLOCKING override;
   void sleep_until(Instant wake) noexcept override;
+  Duration thread_time() noexcept MOLDLOFT_NONBLOCKING override;
 
  private:
   Duration start_;

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <utility>
 
+#include "hal/flight_recorder.hpp"
 #include "hal/latest_value.hpp"
 #include "hal/record_ring.hpp"
 #include "hal/run_store.hpp"
@@ -77,7 +78,8 @@ struct Recorder::Rings {
   LatestValue<Message> error;
 };
 
-Recorder::Recorder(const Sizes& sizes) : rings_{std::make_unique<Rings>(sizes)} {}
+Recorder::Recorder(const Sizes& sizes, FlightRecorder* flight)
+    : rings_{std::make_unique<Rings>(sizes)}, flight_{flight} {}
 Recorder::~Recorder() = default;
 
 // ---- the control thread's side
@@ -94,10 +96,14 @@ void Recorder::link_bytes(LinkId link, Direction direction, Instant at,
   offset.store(head.offset + bytes.size(), std::memory_order_relaxed);
   const bool is_bulk = link == LinkId::scanner && direction == Direction::received;
   rings_->keep(is_bulk ? rings_->bulk : rings_->events, Kind::link_bytes, {bytes_of(head), bytes});
+  if (flight_ == nullptr) return;
+  const bool in = direction == Direction::received;
+  flight_->bytes(in ? FlightKind::received : FlightKind::sent, static_cast<int>(link), at, bytes.size());
 }
 
 void Recorder::event(const EventRecord& event) noexcept {
   rings_->keep(rings_->events, Kind::event, {bytes_of(event)});
+  if (flight_ != nullptr) flight_->transition(event);
 }
 void Recorder::shot(const ShotRecord& shot) noexcept {
   rings_->keep(rings_->events, Kind::shot, {bytes_of(shot)});

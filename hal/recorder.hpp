@@ -21,6 +21,7 @@
 
 namespace moldloft::hal {
 
+class FlightRecorder;
 class RunStore;
 
 class Recorder {
@@ -31,7 +32,8 @@ class Recorder {
     std::size_t largest_frame_bytes = 1u << 20;
   };
 
-  explicit Recorder(const Sizes&);
+  // `flight`, when given, is told of the same bytes and transitions, so that its last second shows them.
+  explicit Recorder(const Sizes&, FlightRecorder* flight = nullptr);
   ~Recorder();
 
   // ---- the control thread's side
@@ -53,6 +55,7 @@ class Recorder {
  private:
   struct Rings;
   std::unique_ptr<Rings> rings_;
+  FlightRecorder* flight_;
 };
 
 }  // namespace moldloft::hal

@@ -83,6 +83,9 @@ class Cell final : public Task {
   void command(CellEvent);  // an operator's or line controller's command, taken up in the next tick
   void abort(const hal::Message& why,
              HoldCause = HoldCause::person) MOLDLOFT_NONBLOCKING;  // on the control thread: what is dangerous
+  bool waits_for_sending() const { return frame_decided_; }
+  // On the control thread, when the robot's driver has written what it had.
+  void commands_sent(Instant now) MOLDLOFT_NONBLOCKING;
   CellProgress progress() const { return published_.get(); }
   CellState state() const { return state_; }
   Phase phase() const { return phase_; }
@@ -99,9 +102,10 @@ class Cell final : public Task {
   std::uint64_t points_seen() const { return points_seen_; }
   const CycleTimes& cycle() const { return cycle_; }
   Duration surface_after_last_frame() const { return surface_ready_ - last_frame_; }
-  const Histogram& frame_to_command() const {
-    return frame_to_command_;
-  }  // last byte of a frame in, command given out
+  // Of every target that a frame decided: from its last byte read to the command handed to the robot's link, ...
+  const Histogram& frame_to_command() const { return frame_to_command_; }
+  // ... and from the end of its exposure, as the scanner reported it: how old the data were.
+  const Histogram& data_age() const { return data_age_; }
   std::size_t view_bytes() const { return view_.bytes(); }
   std::size_t plan_bytes() const;
 
@@ -111,6 +115,7 @@ class Cell final : public Task {
     hal::ShotPurpose purpose{};
     ShotPlace place;
     hal::Pose commanded, reported;
+    Instant exposed_at{0};
     int attempts = 0;
     bool turned_half = false;  // the other of the two yaws that look the same has been tried
   };
@@ -177,6 +182,7 @@ class Cell final : public Task {
   StartStep start_step_ = StartStep::devices;
   bool devices_started_ = false, calibrated_ = false;
   bool counting_ = false, has_driven_ = false;
+  bool frame_decided_ = false;  // the target that the robot's driver has not written yet
 
   ShotState shot_state_ = ShotState::parked;
   std::optional<Order> wanted_;
@@ -194,7 +200,7 @@ class Cell final : public Task {
   int retaken_ = 0;
   std::uint64_t points_seen_ = 0;
   CycleTimes cycle_;
-  Histogram frame_to_command_;
+  Histogram frame_to_command_, data_age_;
   hal::LatestValue<CellProgress> published_;
 };
 

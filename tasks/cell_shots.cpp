@@ -1,6 +1,7 @@
 // One shot after another: drive, expose, deliver; and the same from the archive.
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "tasks/cell.hpp"
 #include "tasks/tool_pose.hpp"
@@ -65,10 +66,12 @@ void Cell::carry_out(ShotAction action) {
       return trigger();
     case ShotAction::release_arm:
       exposed_ = arm_;
+      exposed_.exposed_at = now_;
       if (phase_ == Phase::scan_surface) next_surface_shot();
       return;
     case ShotAction::release_and_deliver:
       exposed_ = arm_;
+      exposed_.exposed_at = now_;
       if (phase_ == Phase::scan_surface) next_surface_shot();
       return deliver();
     case ShotAction::deliver:
@@ -88,9 +91,14 @@ void Cell::drive() {
     return abort("robot takes no target although it said it was ready: check it and clear");
   }
   has_driven_ = true;
-  if (last_frame_ > Instant{0} && (arm_.purpose != ShotPurpose::surface)) {
-    frame_to_command_.add(clock_.now() - last_frame_);
-  }
+  // The places of the surface are planned: no frame decides them, and none is waited for.
+  frame_decided_ = last_frame_ > Instant{0} && arm_.purpose != ShotPurpose::surface;
+}
+
+void Cell::commands_sent(Instant now) {
+  if (!std::exchange(frame_decided_, false)) return;
+  frame_to_command_.add(now - last_frame_);
+  data_age_.add(now - exposed_.exposed_at);
 }
 
 // Two yaws half a turn apart look the same; the one that the workspace allows and that turns the head less is taken.

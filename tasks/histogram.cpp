@@ -48,6 +48,25 @@ Histogram::Duration Histogram::mean() const noexcept {
   return Duration{count_ == 0 ? 0 : sum_ / static_cast<std::int64_t>(count_)};
 }
 
+Histogram::Duration Histogram::standard_deviation() const noexcept {
+  if (count_ < 2) return Duration{0};
+  double sum = 0, squares = 0, counted = 0;
+  const auto middle_of = [](std::size_t i) {
+    return 0.5 * static_cast<double>((lower_limit(i) + upper_limit(i)).count());
+  };
+  for (std::size_t i = 0; i < buckets; ++i) {
+    counted += static_cast<double>(counts_[i]);
+    sum += static_cast<double>(counts_[i]) * middle_of(i);
+  }
+  if (counted < 2) return Duration{0};
+  const double mean_ns = sum / counted;
+  for (std::size_t i = 0; i < buckets; ++i) {
+    const double off = middle_of(i) - mean_ns;
+    squares += static_cast<double>(counts_[i]) * off * off;
+  }
+  return Duration{static_cast<std::int64_t>(std::sqrt(squares / (counted - 1)))};
+}
+
 Histogram::Duration Histogram::percentile(double fraction) const noexcept {
   if (count_ == 0) return Duration{0};
   const auto wanted = static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(count_)));

@@ -25,11 +25,25 @@ class Histogram {
 
   std::uint64_t count() const noexcept { return count_; }
   std::uint64_t overflows() const noexcept { return overflows_; }
+  bool empty() const noexcept { return count_ == 0; }
   Duration min() const noexcept { return count_ == 0 ? Duration{0} : Duration{min_}; }
   Duration max() const noexcept { return Duration{max_}; }
   Duration mean() const noexcept;
   // The smallest bucket limit that at least `fraction` (0..1) of the values do not exceed; never beyond max().
   Duration percentile(double fraction) const noexcept;
+  // From the buckets, each by its middle: as exact as they are. 0 below two values.
+  Duration standard_deviation() const noexcept;
+
+  // ---- the buckets, for a page that draws them: bucket i holds the values of lower_limit(i) to
+  // upper_limit(i), both included
+  static constexpr std::size_t size() noexcept { return buckets; }
+  std::uint64_t in_bucket(std::size_t i) const noexcept { return counts_[i]; }
+  static Duration lower_limit(std::size_t i) noexcept {
+    return Duration{i == 0 ? 0 : static_cast<std::int64_t>(limit_of(i - 1)) + 1};
+  }
+  static Duration upper_limit(std::size_t i) noexcept {
+    return Duration{static_cast<std::int64_t>(limit_of(i))};
+  }
 
  private:
   static constexpr int sub_bits = 5;  // 32 buckets an octave: width at most 1/32 of the value
@@ -38,7 +52,7 @@ class Histogram {
   static std::size_t bucket_of(std::uint64_t ns) noexcept;
   static std::uint64_t limit_of(std::size_t bucket) noexcept;  // the largest value that falls into it
 
-  std::array<std::uint32_t, buckets> counts_{};
+  std::array<std::uint64_t, buckets> counts_{};  // 32 bits would be full after 50 days of milliseconds
   std::uint64_t count_ = 0, overflows_ = 0;
   std::int64_t min_ = INT64_MAX, max_ = 0;
   std::int64_t sum_ = 0;  // of nanoseconds: 292 years

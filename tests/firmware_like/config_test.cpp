@@ -47,7 +47,8 @@ std::string values(const CellConfig& c) {
   const auto range = [](const tasks::Range& r) { return fmt::format("{}..{}", r.min, r.max); };
   const auto& s = c.scanner;
   const auto& w = c.robot.workspace;
-  return fmt::format("{} {} {} ", c.name, c.tick.count(), c.device_timeout.count()) +
+  return fmt::format("{} {} {} {} ", c.name, c.tick.count(), static_cast<int>(c.missed_ticks),
+                     c.device_timeout.count()) +
          fmt::format("{} {} {} {} {} {} {} {} {} {} {} ", s.driver, s.host, s.port,
                      static_cast<int>(s.encoding), s.max_stripes, s.max_points_per_stripe, s.field_x_mm,
                      s.field_y_mm, s.noise_mm, s.depth_mm, mount) +
@@ -75,7 +76,8 @@ bool is_key(const std::string& line) {
 // Another value of the same kind that every key takes.
 std::string changed(const std::string& line) {
   static const std::vector<std::pair<std::string, std::string>> other = {{"name", "\"port side\""},
-                                                                         {"tick_us", "500"},
+                                                                         {"tick_us", "2000"},
+                                                                         {"missed_ticks", "\"stop\""},
                                                                          {"device_timeout_s", "2.5"},
                                                                          {"host", "\"10.0.0.7\""},
                                                                          {"port", "4015"},
@@ -146,7 +148,7 @@ TEST_CASE("every key of the example is read: another value makes another configu
     other.erase(other.begin() + static_cast<std::ptrdiff_t>(i));
     CHECK(values(parsed(joined(other))) == before);
   }
-  CHECK(keys == 44);
+  CHECK(keys == 45);
   CHECK(fixed == 3);
 }
 

@@ -23,7 +23,7 @@ TEST_CASE("a tick that comes too late is skipped and the phase kept") {
   CHECK(tracker.starts == Instants{0ms, 2ms, 6ms});  // due at 4 ms, but tick 4 came while it still ran
   CHECK(scheduler.tasks()[0].overruns == 1);
   CHECK(scheduler.missed_ticks() == 2);  // ticks 3 and 4
-  CHECK(scheduler.name_of(scheduler.last_miss_cause()) == "tracker");
+  CHECK(scheduler.name_of(scheduler.last_miss().task) == "tracker");
 }
 
 TEST_CASE("a tick that is late by less than the tolerance still runs") {
@@ -177,7 +177,7 @@ TEST_CASE("a late wake-up is measured and is nobody's fault") {
   scheduler.run_tick();
   CHECK(scheduler.wake_up().max() == 1300us);
   CHECK(scheduler.missed_ticks() == 1);
-  CHECK(scheduler.last_miss_cause() == Scheduler::no_task);
+  CHECK(scheduler.last_miss().task == Scheduler::no_task);
 }
 
 TEST_CASE("the first ticks stay out of the statistics") {

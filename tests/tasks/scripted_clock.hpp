@@ -15,12 +15,19 @@ class ScriptedClock final : public hal::Clock {
     now_ += oversleep;
   }
   void charge(Duration) noexcept override {}
-  void pass(Duration d) noexcept { now_ += d; }
+  Duration thread_time() noexcept override { return spent_; }
+  void pass(Duration d) noexcept {  // the thread computes
+    now_ += d;
+    spent_ += d;
+  }
+  void be_preempted(Duration d) noexcept { now_ += d; }
+  void stand_at(Instant t) noexcept { now_ = t; }
 
   Duration oversleep{0};  // how late the next wake-ups are
 
  private:
   Instant now_{0};
+  Duration spent_{0};
 };
 
 class ScriptedTask final : public Task {
