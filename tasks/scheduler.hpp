@@ -70,7 +70,7 @@ class Scheduler {
   std::uint64_t heartbeat() const noexcept {
     return heartbeat_.load(std::memory_order_relaxed);
   }                                          // ticks done
-  std::string_view name_of(int task) const;  // a constant after the last add*()
+  std::string_view name_of(int task) const MOLDLOFT_NONBLOCKING;  // a constant after the last add*()
 
   // ---- on the control thread, or when it has come to rest
   std::uint64_t ticks() const noexcept { return ticks_; }
