@@ -17,6 +17,7 @@
 #include "hal/flight_recorder.hpp"
 #include "hal/line_robot.hpp"
 #include "hal/psc_scanner.hpp"
+#include "hal/realtime.hpp"
 #include "hal/recorder.hpp"
 #include "hal/tapped_link.hpp"
 #include "tasks/cell.hpp"
@@ -56,17 +57,17 @@ class Controller {
  private:
   struct Row {  // of the task table: a function of the controller
     Controller* owner;
-    void (Controller::*function)(hal::Instant);
+    void (Controller::*function)(hal::Instant) MOLDLOFT_NONBLOCKING;
     void operator()(hal::Instant now) const { (owner->*function)(now); }
   };
   using RowTask = tasks::FunctionTask<Row>;
-  void receive_scanner(hal::Instant now) { scanner_->receive(now); }
-  void receive_robot(hal::Instant now) { robot_->receive(now); }
-  void transmit_robot(hal::Instant now);
-  void transmit_scanner(hal::Instant now) { scanner_->transmit(now); }
-  void watch_health(hal::Instant now);
-  hal::Message missed_tick_text() const;
-  void report_abort();
+  void receive_scanner(hal::Instant now) MOLDLOFT_NONBLOCKING { scanner_->receive(now); }
+  void receive_robot(hal::Instant now) MOLDLOFT_NONBLOCKING { robot_->receive(now); }
+  void transmit_robot(hal::Instant now) MOLDLOFT_NONBLOCKING;
+  void transmit_scanner(hal::Instant now) MOLDLOFT_NONBLOCKING { scanner_->transmit(now); }
+  void watch_health(hal::Instant now) MOLDLOFT_NONBLOCKING;
+  hal::Message missed_tick_text() const MOLDLOFT_NONBLOCKING;
+  void report_abort() MOLDLOFT_NONBLOCKING;
 
   CellConfig config_;
   hal::Clock& clock_;

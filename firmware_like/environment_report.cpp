@@ -60,6 +60,16 @@ Json setup_json(const SetupRows& rows) {
   return all;
 }
 
+Json counts_json(const ThreadCounts& c) {
+  return {{"ticks", c.ticks},
+          {"minor_faults", c.minor_faults},
+          {"major_faults", c.major_faults},
+          {"voluntary_switches", c.voluntary_switches},
+          {"involuntary_switches", c.involuntary_switches},
+          {"migrations", c.migrations},
+          {"suspensions", c.suspensions}};
+}
+
 void put_conditions(Json& report, const RunConditions* conditions) {
   if (conditions == nullptr) {
     report["representative"] = false;
@@ -69,6 +79,7 @@ void put_conditions(Json& report, const RunConditions* conditions) {
   const Verdict verdict = verdict_on(conditions->environment, conditions->setup, conditions->realtime);
   report["environment"] = environment_json(conditions->environment);
   report["setup"] = setup_json(conditions->setup);
+  report["control_thread"] = counts_json(conditions->control_thread);
   report["representative"] = verdict.representative;
   report["why"] = verdict.why();
 }

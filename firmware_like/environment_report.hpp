@@ -4,6 +4,7 @@
 
 #include "firmware_like/environment.hpp"
 #include "firmware_like/surface_file.hpp"
+#include "firmware_like/thread_counts.hpp"
 
 namespace moldloft::firmware_like {
 
@@ -12,12 +13,14 @@ struct RunConditions {
   RealtimeConfig realtime;
   Environment environment;
   SetupRows setup;
+  ThreadCounts control_thread = {};  // what the operating system did to it
 };
 
 Json environment_json(const Environment&);
 Json setup_json(const SetupRows&);
+Json counts_json(const ThreadCounts&);
 
-// The keys environment, setup, representative and why; for virtual time (null) the last two alone.
+// The keys environment, setup, control_thread, representative and why; for virtual time (null) the last two alone.
 void put_conditions(Json& report, const RunConditions*);
 
 std::string conditions_text(const RunConditions&);

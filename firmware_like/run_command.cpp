@@ -10,6 +10,7 @@
 #include <optional>
 #include <random>
 
+#include "firmware_like/control_loop.hpp"
 #include "firmware_like/control_thread.hpp"
 #include "firmware_like/display.hpp"
 #include "firmware_like/operator_channel.hpp"
@@ -114,12 +115,6 @@ std::uint32_t fresh_epoch() {
   return (device() ^ static_cast<std::uint32_t>(std::time(nullptr))) & 0xFFFFFu;
 }
 
-void run_to_rest(Controller& controller) {
-  controller.start();
-  while (controller.tick()) {
-  }
-}
-
 // When the run began; stores of before that was kept do not know.
 std::string begun_of(const hal::RunStore& store) { return store.meta("begun").value_or(""); }
 
@@ -207,13 +202,13 @@ int run_cell(const RunOptions& options) {
                                                      .begin_held = options.resume_held,
                                                      .attended = operator_socket.has_value()});
   guard.stops(*controller);
-  RunConditions conditions{config->realtime, read_environment(config->realtime.cpu), {}};
+  RunConditions conditions{config->realtime, read_environment(config->realtime.cpu), {}, {}};
   std::optional<ServiceThread> service;
   {
     FlightFiles flight{controller->flight(), folder->path};
     const CrashDump crash{*controller, folder->path};
     const ProcessSetup process{config->realtime};
-    ControlThread control{config->realtime, [&] { run_to_rest(*controller); }};
+    ControlThread control{config->realtime, [&] { conditions.control_thread = run_to_rest(*controller); }};
     const RecorderThread recorder{controller->recorder(), *folder->store, flight};
     std::optional<OperatorThread> operators;
     if (operator_socket) operators.emplace(*operator_socket, controller->cell());

@@ -13,6 +13,7 @@ std::expected<StoredShots, hal::StoreError> StoredShots::load(const hal::RunStor
     if (!frame) return std::unexpected{frame.error()};
     loaded.frames_.push_back(std::make_unique<hal::Frame>(std::move(*frame)));
     loaded.last_epoch_ = std::max(loaded.last_epoch_, record.shot_id >> tasks::shot_number_bits);
+    loaded.last_ = std::max(loaded.last_, tasks::shot_number_of(record.shot_id));
     loaded.shots_[tasks::shot_number_of(record.shot_id)] = {loaded.frames_.back().get(), record};
   }
   return loaded;

@@ -13,14 +13,14 @@ class StoredShots final : public tasks::ShotArchive {
  public:
   static std::expected<StoredShots, hal::StoreError> load(const hal::RunStore&);
   const tasks::ArchivedShot* find(std::uint32_t number) const override;
-  std::uint32_t last() const override { return shots_.empty() ? 0 : shots_.rbegin()->first; }
+  std::uint32_t last() const override { return last_; }
   std::uint32_t last_epoch() const { return last_epoch_; }  // 0 for none
   std::size_t size() const { return shots_.size(); }
 
  private:
   std::vector<std::unique_ptr<hal::Frame>> frames_;
   std::map<std::uint32_t, tasks::ArchivedShot> shots_;
-  std::uint32_t last_epoch_ = 0;
+  std::uint32_t last_ = 0, last_epoch_ = 0;
 };
 
 }  // namespace moldloft::firmware_like

@@ -1,6 +1,8 @@
 // What can go wrong with data that came from outside, as names. to_string() gives the words for a person.
 #pragma once
 
+#include "geometry/nonblocking.hpp"
+
 #include <string_view>
 
 namespace moldloft::geometry {
@@ -50,6 +52,6 @@ enum class Error {
   singular_parametrization,  // r_u x r_v vanishes: the surface has no tangent plane there
 };
 
-std::string_view to_string(Error) noexcept;
+std::string_view to_string(Error) noexcept MOLDLOFT_GEOMETRY_NONBLOCKING;
 
 }  // namespace moldloft::geometry

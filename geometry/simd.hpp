@@ -34,12 +34,11 @@ inline bool machine_has(Simd simd) {
   return simd == Simd::portable;
 }
 
-inline Simd widest_simd() {
-  static const Simd widest = machine_has(Simd::avx512) ? Simd::avx512
-                             : machine_has(Simd::avx2) ? Simd::avx2
-                                                       : Simd::portable;
-  return widest;
-}
+// Asked once, before main(): a local static takes a lock when it is first used.
+inline const Simd widest_of_this_machine = machine_has(Simd::avx512) ? Simd::avx512
+                                           : machine_has(Simd::avx2) ? Simd::avx2
+                                                                     : Simd::portable;
+inline Simd widest_simd() { return widest_of_this_machine; }
 
 }  // namespace moldloft::geometry
 

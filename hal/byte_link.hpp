@@ -6,6 +6,8 @@
 // Failure      a lost link stays lost until open() is called again; why() says what happened
 #pragma once
 
+#include "hal/realtime.hpp"
+
 #include <cstddef>
 #include <span>
 #include <string_view>
@@ -18,18 +20,18 @@ class ByteLink {
  public:
   virtual ~ByteLink() = default;
 
-  virtual void open() = 0;  // starts to open; state() tells when it is done
-  virtual void close() noexcept = 0;
+  virtual void open() MOLDLOFT_NONBLOCKING = 0;  // starts to open; state() tells when it is done
+  virtual void close() noexcept MOLDLOFT_NONBLOCKING = 0;
 
   // Moves bytes that have arrived into `out`; returns how many, 0 if none are there now.
-  virtual std::size_t read(std::span<std::byte> out) noexcept = 0;
+  virtual std::size_t read(std::span<std::byte> out) noexcept MOLDLOFT_NONBLOCKING = 0;
 
   // Takes what fits into the send buffer; returns how many bytes were taken. The rest is the caller's to keep.
-  virtual std::size_t write(std::span<const std::byte> in) noexcept = 0;
+  virtual std::size_t write(std::span<const std::byte> in) noexcept MOLDLOFT_NONBLOCKING = 0;
 
   // Looks at the link once more (a pending connect may have ended, a peer may have hung up) and says how it stands.
-  virtual LinkState state() noexcept = 0;
-  virtual std::string_view why() const noexcept = 0;
+  virtual LinkState state() noexcept MOLDLOFT_NONBLOCKING = 0;
+  virtual std::string_view why() const noexcept MOLDLOFT_NONBLOCKING = 0;
 };
 
 }  // namespace moldloft::hal

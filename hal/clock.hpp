@@ -6,6 +6,8 @@
 // Failure      none; an interrupted sleep is taken up again
 #pragma once
 
+#include "hal/realtime.hpp"
+
 #include <chrono>
 
 namespace moldloft::hal {
@@ -19,26 +21,26 @@ class Clock {
  public:
   virtual ~Clock() = default;
 
-  virtual Instant now() noexcept = 0;
+  virtual Instant now() noexcept MOLDLOFT_NONBLOCKING = 0;
   virtual void sleep_until(Instant wake) noexcept = 0;  // returns at once when `wake` has passed
 
   // What the calling thread has spent on the processor, from any origin: the difference of two readings, beside that of
   // now(), tells how long the thread was ready and did not run. Costs more than now(). Where time is not real nobody
   // is ever preempted.
-  virtual Duration thread_time() noexcept { return now(); }
+  virtual Duration thread_time() noexcept MOLDLOFT_NONBLOCKING { return now(); }
 
   // Says that work of this declared cost has just been done. A real clock has seen it pass and ignores the call; a
   // virtual clock moves by it, so that a simulated tick costs what its tasks declare.
-  virtual void charge(Duration) noexcept {}
+  virtual void charge(Duration) noexcept MOLDLOFT_NONBLOCKING {}
 };
 
 // CLOCK_MONOTONIC, counted from the construction of the object. Sleeps to absolute deadlines.
 class SteadyClock final : public Clock {
  public:
   SteadyClock() noexcept;
-  Instant now() noexcept override;
+  Instant now() noexcept MOLDLOFT_NONBLOCKING override;
   void sleep_until(Instant wake) noexcept override;
-  Duration thread_time() noexcept override;
+  Duration thread_time() noexcept MOLDLOFT_NONBLOCKING override;
 
  private:
   Duration start_;
@@ -48,9 +50,9 @@ class SteadyClock final : public Clock {
 // is carried along by overriding advance().
 class VirtualClock : public Clock {
  public:
-  Instant now() noexcept final { return now_; }
+  Instant now() noexcept MOLDLOFT_NONBLOCKING final { return now_; }
   void sleep_until(Instant wake) noexcept final;
-  void charge(Duration cost) noexcept final { now_ += cost; }
+  void charge(Duration cost) noexcept MOLDLOFT_NONBLOCKING final { now_ += cost; }
 
  protected:
   // Called with time standing at `wake` each time that a sleep has ended.

@@ -46,6 +46,9 @@ std::uint64_t load_word(const std::byte* at) noexcept {
 }
 
 #if defined(__x86_64__)
+// Asked before main(): inside the function, the first call would take the lock of a local static.
+const bool has_instruction = __builtin_cpu_supports("sse4.2");
+
 __attribute__((target("sse4.2"))) std::uint32_t crc32c_sse42(std::span<const std::byte> bytes,
                                                              std::uint32_t before) noexcept {
   std::uint64_t crc = ~before;
@@ -76,7 +79,6 @@ std::uint32_t crc32c_by_table(std::span<const std::byte> bytes, std::uint32_t be
 
 std::uint32_t crc32c_by_instruction(std::span<const std::byte> bytes, std::uint32_t before) noexcept {
 #if defined(__x86_64__)
-  static const bool has_instruction = __builtin_cpu_supports("sse4.2");
   if (has_instruction) return crc32c_sse42(bytes, before);
 #endif
   return crc32c_by_table(bytes, before);

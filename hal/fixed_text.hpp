@@ -6,13 +6,30 @@
 // Failure      a text that does not fit is cut at the capacity
 #pragma once
 
+#include "hal/realtime.hpp"
+
 #include <fmt/format.h>
 
 #include <array>
+#include <cstring>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 
 namespace moldloft::hal {
+
+// A pattern of fmt that fits the arguments' types, or the program does not compile: the check is over before it runs.
+template <typename... Args>
+struct BasicTextPattern {
+  MOLDLOFT_EFFECTS_UNCHECKED_BEGIN
+  template <typename Text>
+  consteval BasicTextPattern(const Text& text) MOLDLOFT_NONBLOCKING  // NOLINT(google-explicit-constructor)
+      : pattern{text} {}
+  MOLDLOFT_EFFECTS_UNCHECKED_END
+  fmt::format_string<Args...> pattern;
+};
+template <typename... Args>
+using TextPattern = BasicTextPattern<std::type_identity_t<Args>...>;
 
 template <std::size_t capacity>
 class FixedText {
@@ -22,16 +39,20 @@ class FixedText {
   FixedText(const char* text) { assign(text); }       // NOLINT(google-explicit-constructor)
 
   template <typename... Args>
-  static FixedText format(fmt::format_string<Args...> pattern, Args&&... args) {
+  static FixedText format(TextPattern<Args...> text_pattern, Args&&... args) MOLDLOFT_NONBLOCKING {
     FixedText text;
-    const auto result = fmt::format_to_n(text.chars_.data(), capacity, pattern, std::forward<Args>(args)...);
+    // fmt writes where it is told to and throws for a pattern that does not fit, which cannot get here.
+    const auto result = checked_at_run_time([&] {
+      return fmt::format_to_n(text.chars_.data(), capacity, text_pattern.pattern,
+                              std::forward<Args>(args)...);
+    });
     text.size_ = result.size < capacity ? result.size : capacity;
     return text;
   }
 
   void assign(std::string_view text) noexcept {
     size_ = text.size() < capacity ? text.size() : capacity;
-    text.copy(chars_.data(), size_);
+    if (size_ > 0) std::memcpy(chars_.data(), text.data(), size_);
   }
   std::string_view view() const noexcept { return {chars_.data(), size_}; }
   operator std::string_view() const noexcept { return view(); }  // NOLINT(google-explicit-constructor)

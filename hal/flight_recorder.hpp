@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "hal/flight_dump.hpp"
+#include "hal/realtime.hpp"
 
 namespace moldloft::hal {
 
@@ -35,15 +36,15 @@ class FlightRecorder {
 
   // ---- the control thread
   void name(int task, std::string_view) noexcept;  // 0..126, before the first tick
-  void tick(Instant woken, Duration late, std::uint64_t number) noexcept;
-  void note(FlightKind kind, int id, Instant at, Duration value) noexcept {
+  void tick(Instant woken, Duration late, std::uint64_t number) noexcept MOLDLOFT_NONBLOCKING;
+  void note(FlightKind kind, int id, Instant at, Duration value) noexcept MOLDLOFT_NONBLOCKING {
     note(kind, id, at, value.count() < 0 ? 0u : static_cast<std::uint64_t>(value.count()));
   }
-  void bytes(FlightKind kind, int link, Instant at, std::size_t count) noexcept {
+  void bytes(FlightKind kind, int link, Instant at, std::size_t count) noexcept MOLDLOFT_NONBLOCKING {
     note(kind, link, at, std::uint64_t{count});
   }
-  void transition(const EventRecord&) noexcept;
-  void trigger(FlightCause, int task, Instant at) noexcept;
+  void transition(const EventRecord&) noexcept MOLDLOFT_NONBLOCKING;
+  void trigger(FlightCause, int task, Instant at) noexcept MOLDLOFT_NONBLOCKING;
   std::uint64_t later_triggers() const noexcept { return later_triggers_; }
 
   // ---- from anywhere, a signal handler included: the next tick triggers
@@ -65,7 +66,7 @@ class FlightRecorder {
  private:
   enum class State : std::uint32_t { running, triggered, frozen };
 
-  void note(FlightKind kind, int id, Instant at, std::uint64_t value) noexcept {
+  void note(FlightKind kind, int id, Instant at, std::uint64_t value) noexcept MOLDLOFT_NONBLOCKING {
     if (state_.load(std::memory_order_relaxed) == State::frozen) return;
     const std::uint64_t n = written_.load(std::memory_order_relaxed);
     ring_[n & mask_] = {.at_ns = at.count(),

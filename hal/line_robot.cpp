@@ -55,8 +55,8 @@ Message text_of_error(int code) {
 struct LineRobot::Transition {
   Phase from;
   Cue cue;
-  bool (LineRobot::*guard)() const;
-  void (LineRobot::*action)(Instant);
+  bool (LineRobot::*guard)() const MOLDLOFT_NONBLOCKING;
+  void (LineRobot::*action)(Instant) MOLDLOFT_NONBLOCKING;
   Phase to;
 };
 

@@ -82,34 +82,34 @@ class LineRobot final : public Robot {
   void cue(Cue, Instant now);
 
   // guards
-  bool always() const { return true; }
-  bool has_resends() const { return resends_ < settings_.resends; }
-  bool is_latched() const { return latched_; }
-  bool is_stopping() const { return stop_requested_; }
-  bool has_stopped() const { return stop_requested_ && !stop_wanted_; }
+  bool always() const MOLDLOFT_NONBLOCKING { return true; }
+  bool has_resends() const MOLDLOFT_NONBLOCKING { return resends_ < settings_.resends; }
+  bool is_latched() const MOLDLOFT_NONBLOCKING { return latched_; }
+  bool is_stopping() const MOLDLOFT_NONBLOCKING { return stop_requested_; }
+  bool has_stopped() const MOLDLOFT_NONBLOCKING { return stop_requested_ && !stop_wanted_; }
 
   // actions
-  void nothing(Instant) {}
-  void open_link(Instant now);
-  void back_off(Instant now);
-  void report_loss(Instant now);
-  void report_silence(Instant now);
-  void start_sync(Instant now);
-  void send_syn(Instant now);
-  void ask_status(Instant now);
-  void send_stop_and_wait(Instant now);
-  void ask_pose(Instant now);
-  void announce(Instant now);
-  void send_command(Instant now);
-  void resend_command(Instant now);
-  void resend_afresh(Instant now);
-  void report_moving(Instant now);
-  void await_done(Instant now);
-  void report_done(Instant now);
-  void report_refused(Instant now);
-  void report_stopped_and_sync(Instant now);
-  void report_fault(Instant now);
-  void unlatch(Instant now);
+  void nothing(Instant) MOLDLOFT_NONBLOCKING {}
+  void open_link(Instant now) MOLDLOFT_NONBLOCKING;
+  void back_off(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_loss(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_silence(Instant now) MOLDLOFT_NONBLOCKING;
+  void start_sync(Instant now) MOLDLOFT_NONBLOCKING;
+  void send_syn(Instant now) MOLDLOFT_NONBLOCKING;
+  void ask_status(Instant now) MOLDLOFT_NONBLOCKING;
+  void send_stop_and_wait(Instant now) MOLDLOFT_NONBLOCKING;
+  void ask_pose(Instant now) MOLDLOFT_NONBLOCKING;
+  void announce(Instant now) MOLDLOFT_NONBLOCKING;
+  void send_command(Instant now) MOLDLOFT_NONBLOCKING;
+  void resend_command(Instant now) MOLDLOFT_NONBLOCKING;
+  void resend_afresh(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_moving(Instant now) MOLDLOFT_NONBLOCKING;
+  void await_done(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_done(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_refused(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_stopped_and_sync(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_fault(Instant now) MOLDLOFT_NONBLOCKING;
+  void unlatch(Instant now) MOLDLOFT_NONBLOCKING;
 
   // what arrives
   void take_bytes(std::span<const std::byte> bytes, Instant now);

@@ -16,6 +16,7 @@
 
 #include "hal/fixed_text.hpp"
 #include "hal/frame.hpp"
+#include "hal/realtime.hpp"
 
 namespace moldloft::hal::psc1 {
 
@@ -62,7 +63,7 @@ enum class Flaw {
   payload_size,
   content
 };
-std::string_view to_string(Flaw);
+std::string_view to_string(Flaw) MOLDLOFT_NONBLOCKING;
 
 struct Header {
   Type type{};
@@ -118,23 +119,29 @@ struct FrameHead {
   std::array<float, 3> scale{}, offset{};  // int16: mm = offset + scale * value; -32768 is a missing point
 };
 
-std::uint32_t crc32c(std::span<const std::byte> bytes, std::uint32_t before = 0) noexcept;
+std::uint32_t crc32c(std::span<const std::byte> bytes,
+                     std::uint32_t before = 0) noexcept MOLDLOFT_NONBLOCKING;
 
 // ---- headers
 void encode_header(const Header&, std::span<std::byte, header_size> out) noexcept;
-std::expected<Header, Flaw> decode_header(std::span<const std::byte, header_size> in) noexcept;
+std::expected<Header, Flaw> decode_header(std::span<const std::byte, header_size> in) noexcept
+    MOLDLOFT_NONBLOCKING;
 
 // ---- whole messages: header, payload, payload CRC into `out`; returns the bytes written, 0 if `out` is too small
-std::size_t encode(std::uint32_t request_id, const HelloRequest&, std::span<std::byte> out) noexcept;
+std::size_t encode(std::uint32_t request_id, const HelloRequest&,
+                   std::span<std::byte> out) noexcept MOLDLOFT_NONBLOCKING;
 std::size_t encode(std::uint32_t request_id, const HelloReply&, std::span<std::byte> out) noexcept;
-std::size_t encode(std::uint32_t request_id, const Config&, std::span<std::byte> out) noexcept;
-std::size_t encode(std::uint32_t request_id, const Trigger&, std::span<std::byte> out) noexcept;
+std::size_t encode(std::uint32_t request_id, const Config&,
+                   std::span<std::byte> out) noexcept MOLDLOFT_NONBLOCKING;
+std::size_t encode(std::uint32_t request_id, const Trigger&,
+                   std::span<std::byte> out) noexcept MOLDLOFT_NONBLOCKING;
 std::size_t encode(std::uint32_t request_id, const Exposed&, std::uint64_t acquired_ns,
                    std::span<std::byte> out) noexcept;
 std::size_t encode(std::uint32_t request_id, const StatusReply&, std::span<std::byte> out) noexcept;
 std::size_t encode(std::uint32_t request_id, const ErrorReply&, std::span<std::byte> out) noexcept;
 std::size_t encode_empty(std::uint32_t request_id, Type,
-                         std::span<std::byte> out) noexcept;  // PING, RESET, STATUS request
+                         std::span<std::byte> out) noexcept
+    MOLDLOFT_NONBLOCKING;  // PING, RESET, STATUS request
 
 // A frame as it goes over the wire. int16 takes scale and offset from the extent that `field` gives (+-x,
 // +-y, +-depth).
@@ -144,20 +151,26 @@ std::size_t encode_frame(std::uint32_t request_id, const Frame&, Encoding, bool 
 
 // ---- payloads
 std::expected<HelloRequest, Flaw> decode_hello_request(std::span<const std::byte> payload) noexcept;
-std::expected<HelloReply, Flaw> decode_hello_reply(std::span<const std::byte> payload) noexcept;
-std::expected<Config, Flaw> decode_config(std::span<const std::byte> payload) noexcept;
-std::expected<Trigger, Flaw> decode_trigger(std::span<const std::byte> payload) noexcept;
-std::expected<Exposed, Flaw> decode_exposed(std::span<const std::byte> payload) noexcept;
-std::expected<StatusReply, Flaw> decode_status(std::span<const std::byte> payload) noexcept;
-std::expected<ErrorReply, Flaw> decode_error(std::span<const std::byte> payload) noexcept;
-std::expected<FrameHead, Flaw> decode_frame_head(std::span<const std::byte> payload) noexcept;
+std::expected<HelloReply, Flaw> decode_hello_reply(std::span<const std::byte> payload) noexcept
+    MOLDLOFT_NONBLOCKING;
+std::expected<Config, Flaw> decode_config(std::span<const std::byte> payload) noexcept MOLDLOFT_NONBLOCKING;
+std::expected<Trigger, Flaw> decode_trigger(std::span<const std::byte> payload) noexcept MOLDLOFT_NONBLOCKING;
+std::expected<Exposed, Flaw> decode_exposed(std::span<const std::byte> payload) noexcept MOLDLOFT_NONBLOCKING;
+std::expected<StatusReply, Flaw> decode_status(std::span<const std::byte> payload) noexcept
+    MOLDLOFT_NONBLOCKING;
+std::expected<ErrorReply, Flaw> decode_error(std::span<const std::byte> payload) noexcept
+    MOLDLOFT_NONBLOCKING;
+std::expected<FrameHead, Flaw> decode_frame_head(std::span<const std::byte> payload) noexcept
+    MOLDLOFT_NONBLOCKING;
 
 // Fills `frame` (its arrays must be large enough) from a FRAME payload; NaN where a point is missing.
-std::expected<void, Flaw> decode_frame(std::span<const std::byte> payload, Frame& frame) noexcept;
+std::expected<void, Flaw> decode_frame(std::span<const std::byte> payload,
+                                       Frame& frame) noexcept MOLDLOFT_NONBLOCKING;
 // The same in pieces: everything but the points, which is where all that can be wrong lies, ...
-std::expected<FrameHead, Flaw> begin_frame(std::span<const std::byte> payload, Frame& frame) noexcept;
+std::expected<FrameHead, Flaw> begin_frame(std::span<const std::byte> payload,
+                                           Frame& frame) noexcept MOLDLOFT_NONBLOCKING;
 // ... then points `first` to `end` - 1 of the same payload: 2 ns a point.
 void decode_points(std::span<const std::byte> payload, const FrameHead&, std::size_t first, std::size_t end,
-                   Frame& frame) noexcept;
+                   Frame& frame) noexcept MOLDLOFT_NONBLOCKING;
 
 }  // namespace moldloft::hal::psc1

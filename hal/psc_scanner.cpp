@@ -24,8 +24,8 @@ constexpr std::size_t smallest_body = 4096;
 struct PscScanner::Transition {
   Phase from;
   Cue cue;
-  bool (PscScanner::*guard)() const;
-  void (PscScanner::*action)(Instant);
+  bool (PscScanner::*guard)() const MOLDLOFT_NONBLOCKING;
+  void (PscScanner::*action)(Instant) MOLDLOFT_NONBLOCKING;
   Phase to;
 };
 

@@ -113,29 +113,33 @@ class PscScanner final : public Scanner {
   void cue(Cue, Instant now);
 
   // guards
-  bool always() const { return true; }
-  bool has_retries() const { return shot_.attempts <= settings_.retries; }
-  bool shot_waits() const { return shot_.outstanding && !shot_.exposed && has_retries(); }
-  bool frame_waits() const { return shot_.outstanding && shot_.exposed && has_retries() && same_session(); }
-  bool shot_is_void() const { return shot_.outstanding; }
-  bool same_session() const { return shot_.session_id == info_.session_id; }
+  bool always() const MOLDLOFT_NONBLOCKING { return true; }
+  bool has_retries() const MOLDLOFT_NONBLOCKING { return shot_.attempts <= settings_.retries; }
+  bool shot_waits() const MOLDLOFT_NONBLOCKING {
+    return shot_.outstanding && !shot_.exposed && has_retries();
+  }
+  bool frame_waits() const MOLDLOFT_NONBLOCKING {
+    return shot_.outstanding && shot_.exposed && has_retries() && same_session();
+  }
+  bool shot_is_void() const MOLDLOFT_NONBLOCKING { return shot_.outstanding; }
+  bool same_session() const MOLDLOFT_NONBLOCKING { return shot_.session_id == info_.session_id; }
 
   // actions
-  void nothing(Instant) {}
-  void open_link(Instant now);
-  void back_off(Instant now);
-  void report_loss(Instant now);
-  void greet(Instant now);
-  void configure(Instant now);
-  void announce(Instant now);
-  void announce_and_trigger(Instant now);
-  void announce_and_fail(Instant now);
-  void send_trigger(Instant now);
-  void report_exposed(Instant now);
-  void report_frame(Instant now);
-  void report_both(Instant now);  // EXPOSED and FRAME in one
-  void fail_shot(Instant now);
-  void drop_shot(Instant now);
+  void nothing(Instant) MOLDLOFT_NONBLOCKING {}
+  void open_link(Instant now) MOLDLOFT_NONBLOCKING;
+  void back_off(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_loss(Instant now) MOLDLOFT_NONBLOCKING;
+  void greet(Instant now) MOLDLOFT_NONBLOCKING;
+  void configure(Instant now) MOLDLOFT_NONBLOCKING;
+  void announce(Instant now) MOLDLOFT_NONBLOCKING;
+  void announce_and_trigger(Instant now) MOLDLOFT_NONBLOCKING;
+  void announce_and_fail(Instant now) MOLDLOFT_NONBLOCKING;
+  void send_trigger(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_exposed(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_frame(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_both(Instant now) MOLDLOFT_NONBLOCKING;  // EXPOSED and FRAME in one
+  void fail_shot(Instant now) MOLDLOFT_NONBLOCKING;
+  void drop_shot(Instant now) MOLDLOFT_NONBLOCKING;
 
   // what arrives
   std::size_t read_some(std::size_t budget);

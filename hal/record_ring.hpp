@@ -9,6 +9,8 @@
 // Failure      write() says false when the record does not fit; nothing is written then
 #pragma once
 
+#include "hal/realtime.hpp"
+
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -24,9 +26,10 @@ class RecordRing {
   explicit RecordRing(std::size_t capacity_bytes);  // rounded up to 8
 
   // ---- the writer: the parts become one record
-  bool write(std::uint32_t kind, std::initializer_list<std::span<const std::byte>> parts) noexcept;
-  std::size_t room() const noexcept;        // bytes free, frames included
-  std::size_t high_water() const noexcept;  // most bytes that have waited at once
+  bool write(std::uint32_t kind,
+             std::initializer_list<std::span<const std::byte>> parts) noexcept MOLDLOFT_NONBLOCKING;
+  std::size_t room() const noexcept MOLDLOFT_NONBLOCKING;  // bytes free, frames included
+  std::size_t high_water() const noexcept;                 // most bytes that have waited at once
 
   static constexpr std::size_t space_of(std::size_t record_bytes) noexcept {
     return frame_bytes + (record_bytes + 7) / 8 * 8;

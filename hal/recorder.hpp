@@ -16,6 +16,7 @@
 #include <memory>
 #include <span>
 
+#include "hal/realtime.hpp"
 #include "hal/run_record.hpp"
 
 namespace moldloft::hal {
@@ -36,20 +37,20 @@ class Recorder {
   ~Recorder();
 
   // ---- the control thread's side
-  void link_bytes(LinkId, Direction, Instant, std::span<const std::byte>) noexcept;
-  void event(const EventRecord&) noexcept;
-  void shot(const ShotRecord&) noexcept;
-  bool room_for_frame() const noexcept;
-  std::uint64_t lost() const noexcept;                     // records dropped since the start
-  std::uint64_t offset(LinkId, Direction) const noexcept;  // bytes recorded so far
-  std::size_t plan_bytes() const noexcept;                 // both rings
-  std::size_t high_water_bytes() const noexcept;           // the fullest that they have been
+  void link_bytes(LinkId, Direction, Instant, std::span<const std::byte>) noexcept MOLDLOFT_NONBLOCKING;
+  void event(const EventRecord&) noexcept MOLDLOFT_NONBLOCKING;
+  void shot(const ShotRecord&) noexcept MOLDLOFT_NONBLOCKING;
+  bool room_for_frame() const noexcept MOLDLOFT_NONBLOCKING;
+  std::uint64_t lost() const noexcept MOLDLOFT_NONBLOCKING;  // records dropped since the start
+  std::uint64_t offset(LinkId, Direction) const noexcept MOLDLOFT_NONBLOCKING;  // bytes recorded so far
+  std::size_t plan_bytes() const noexcept;                                      // both rings
+  std::size_t high_water_bytes() const noexcept;  // the fullest that they have been
 
   // ---- the other side
   // Moves everything that is there into the store, in one transaction; false when the store refused.
   bool drain(RunStore&);
-  bool store_failed() const noexcept;
-  Message store_error() const;
+  bool store_failed() const noexcept MOLDLOFT_NONBLOCKING;
+  Message store_error() const MOLDLOFT_NONBLOCKING;
 
  private:
   struct Rings;

@@ -13,6 +13,7 @@
 #include "hal/clock.hpp"
 #include "hal/fixed_text.hpp"
 #include "hal/pose.hpp"
+#include "hal/realtime.hpp"
 
 namespace moldloft::hal {
 
@@ -45,20 +46,22 @@ class Robot {
  public:
   virtual ~Robot() = default;
 
-  virtual void start(Instant now) = 0;
-  virtual void receive(Instant now) = 0;
-  virtual void transmit(Instant now) = 0;
+  virtual void start(Instant now) MOLDLOFT_NONBLOCKING = 0;
+  virtual void receive(Instant now) MOLDLOFT_NONBLOCKING = 0;
+  virtual void transmit(Instant now) MOLDLOFT_NONBLOCKING = 0;
 
   // One command at a time: false unless state() is ready. move() drives the tip to `target` at `speed_percent` (1-100).
-  virtual bool move(const Pose& target, int speed_percent, Instant now) = 0;
-  virtual bool calibrate(Instant now) = 0;
-  virtual void stop(Instant now) = 0;   // harmless, at any time: motion ends as fast as the controller allows
-  virtual void reset(Instant now) = 0;  // an operator has cleared the fault: synchronise again
+  virtual bool move(const Pose& target, int speed_percent, Instant now) MOLDLOFT_NONBLOCKING = 0;
+  virtual bool calibrate(Instant now) MOLDLOFT_NONBLOCKING = 0;
+  virtual void stop(Instant now)
+      MOLDLOFT_NONBLOCKING = 0;  // harmless, at any time: motion ends as fast as the controller allows
+  virtual void reset(Instant now)
+      MOLDLOFT_NONBLOCKING = 0;  // an operator has cleared the fault: synchronise again
 
-  virtual std::optional<RobotEvent> next_event() = 0;
-  virtual RobotState state() const = 0;
-  virtual std::string_view why() const = 0;
-  virtual std::size_t plan_bytes() const = 0;  // memory taken at construction
+  virtual std::optional<RobotEvent> next_event() MOLDLOFT_NONBLOCKING = 0;
+  virtual RobotState state() const MOLDLOFT_NONBLOCKING = 0;
+  virtual std::string_view why() const MOLDLOFT_NONBLOCKING = 0;
+  virtual std::size_t plan_bytes() const MOLDLOFT_NONBLOCKING = 0;  // memory taken at construction
 };
 
 }  // namespace moldloft::hal

@@ -7,6 +7,10 @@
 #include <optional>
 #include <utility>
 
+// Text in memory that is there: substr() throws beyond the end, where none of these looks, and to_chars() and
+// from_chars() lie in the standard library.
+MOLDLOFT_CHECKED_AT_RUN_TIME
+
 namespace moldloft::hal::robot_line {
 namespace {
 

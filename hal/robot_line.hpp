@@ -15,6 +15,7 @@
 
 #include "hal/fixed_text.hpp"
 #include "hal/pose.hpp"
+#include "hal/realtime.hpp"
 
 namespace moldloft::hal::robot_line {
 
@@ -76,10 +77,10 @@ std::string_view to_string(Flaw);
 std::uint16_t fletcher16(std::string_view text) noexcept;  // "abcde" gives 51440
 
 // With LF; empty if it cannot be said (not finite, or outside of what a field holds).
-Line format(const Command&) noexcept;
+Line format(const Command&) noexcept MOLDLOFT_NONBLOCKING;
 Line format(const Reply&) noexcept;
 std::expected<Command, Flaw> parse_command(std::string_view line) noexcept;  // without CR and LF
-std::expected<Reply, Flaw> parse_reply(std::string_view line) noexcept;
+std::expected<Reply, Flaw> parse_reply(std::string_view line) noexcept MOLDLOFT_NONBLOCKING;
 
 constexpr int next_number(int number) noexcept { return number == last_number ? 1 : number + 1; }
 

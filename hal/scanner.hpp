@@ -14,6 +14,7 @@
 #include "hal/clock.hpp"
 #include "hal/fixed_text.hpp"
 #include "hal/frame.hpp"
+#include "hal/realtime.hpp"
 
 namespace moldloft::hal {
 
@@ -44,28 +45,29 @@ class Scanner {
  public:
   virtual ~Scanner() = default;
 
-  virtual void start(Instant now) = 0;     // begins to connect
-  virtual void receive(Instant now) = 0;   // reads a bounded number of bytes and works on them
-  virtual void transmit(Instant now) = 0;  // time-outs, requests, heartbeats: bytes out
+  virtual void start(Instant now) MOLDLOFT_NONBLOCKING = 0;  // begins to connect
+  virtual void receive(Instant now)
+      MOLDLOFT_NONBLOCKING = 0;  // reads a bounded number of bytes and works on them
+  virtual void transmit(Instant now) MOLDLOFT_NONBLOCKING = 0;  // time-outs, requests, heartbeats: bytes out
 
   // Asks for one exposure. False unless state() is ready. Ids are chosen by the caller, not 0, each used for one
   // exposure, also across restarts of the program: the scanner answers an id that it knows with the stored frame.
-  virtual bool trigger(std::uint32_t shot_id, Instant now) = 0;
-  virtual void forget_shot() = 0;  // the cell no longer wants the outstanding shot
+  virtual bool trigger(std::uint32_t shot_id, Instant now) MOLDLOFT_NONBLOCKING = 0;
+  virtual void forget_shot() MOLDLOFT_NONBLOCKING = 0;  // the cell no longer wants the outstanding shot
 
-  virtual std::optional<ScannerEvent> next_event() = 0;
-  virtual ScannerState state() const = 0;
-  virtual const ScannerInfo& info() const = 0;
+  virtual std::optional<ScannerEvent> next_event() MOLDLOFT_NONBLOCKING = 0;
+  virtual ScannerState state() const MOLDLOFT_NONBLOCKING = 0;
+  virtual const ScannerInfo& info() const MOLDLOFT_NONBLOCKING = 0;
   // The last accepted one, valid until the next trigger(). Its points come unpacked in pieces, so that a large frame
   // does not take a tick of its own: they are there when unpack() has said true. A driver unpacks by itself, slowly,
   // where nobody asks.
-  virtual const Frame& frame() const = 0;
-  virtual bool unpack(std::size_t at_most_points) = 0;
-  virtual std::uint64_t frame_offset()
-      const = 0;  // where its payload began in all bytes ever received on this link
-  virtual std::uint32_t frame_bytes() const = 0;  // the payload's size
-  virtual std::string_view why() const = 0;       // the last reason for being offline
-  virtual std::size_t plan_bytes() const = 0;     // memory taken at construction
+  virtual const Frame& frame() const MOLDLOFT_NONBLOCKING = 0;
+  virtual bool unpack(std::size_t at_most_points) MOLDLOFT_NONBLOCKING = 0;
+  virtual std::uint64_t frame_offset() const
+      MOLDLOFT_NONBLOCKING = 0;  // where its payload began in all bytes ever received on this link
+  virtual std::uint32_t frame_bytes() const MOLDLOFT_NONBLOCKING = 0;  // the payload's size
+  virtual std::string_view why() const MOLDLOFT_NONBLOCKING = 0;       // the last reason for being offline
+  virtual std::size_t plan_bytes() const MOLDLOFT_NONBLOCKING = 0;     // memory taken at construction
 };
 
 }  // namespace moldloft::hal

@@ -1,6 +1,8 @@
 #include "hal/serial_link.hpp"
 
 #include "hal/fixed_text.hpp"
+#include "hal/realtime.hpp"
+#include "hal/realtime_section.hpp"
 
 #include <libserialport.h>
 #include <poll.h>
@@ -32,6 +34,45 @@ class SerialLink final : public ByteLink {
   SerialLink& operator=(const SerialLink&) = delete;
 
   void open() override {
+    const PromiseSuspended opening;
+    checked_at_run_time([this] { open_port(); });
+  }
+
+  void close() noexcept override {
+    release();
+    state_ = LinkState::closed;
+    why_ = "closed";
+  }
+
+  // libserialport has opened the port so that it does not wait, and these two calls do nothing but ask it.
+  std::size_t read(std::span<std::byte> out) noexcept override {
+    if (state_ != LinkState::open || out.empty()) return 0;
+    return moved(
+        answered_at_once([&] { return answer_of(sp_nonblocking_read(port_, out.data(), out.size())); }));
+  }
+
+  std::size_t write(std::span<const std::byte> in) noexcept override {
+    if (state_ != LinkState::open || in.empty()) return 0;
+    return moved(
+        answered_at_once([&] { return answer_of(sp_nonblocking_write(port_, in.data(), in.size())); }));
+  }
+
+  // A port that is gone reads as 0 bytes, like a silent one: only the hang-up on its handle tells the two
+  // apart.
+  LinkState state() noexcept override {
+    if (state_ != LinkState::open) return state_;
+    const bool hung_up = answered_at_once([&] {
+      pollfd look{.fd = handle_, .events = 0, .revents = 0};
+      return ::poll(&look, 1, 0) > 0 && (look.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0;
+    });
+    if (hung_up) lose("{} has hung up (adapter pulled out, or the far end closed)", device_);
+    return state_;
+  }
+
+  std::string_view why() const noexcept override { return why_; }
+
+ private:
+  void open_port() {
     close();
     if (!can_be_opened()) return;
     if (sp_get_port_by_name(name_for_libserialport(device_).c_str(), &port_) != SP_OK) {
@@ -56,37 +97,6 @@ class SerialLink final : public ByteLink {
     why_ = "";
   }
 
-  void close() noexcept override {
-    release();
-    state_ = LinkState::closed;
-    why_ = "closed";
-  }
-
-  std::size_t read(std::span<std::byte> out) noexcept override {
-    if (state_ != LinkState::open || out.empty()) return 0;
-    return moved(sp_nonblocking_read(port_, out.data(), out.size()));
-  }
-
-  std::size_t write(std::span<const std::byte> in) noexcept override {
-    if (state_ != LinkState::open || in.empty()) return 0;
-    return moved(sp_nonblocking_write(port_, in.data(), in.size()));
-  }
-
-  // A port that is gone reads as 0 bytes, like a silent one: only the hang-up on its handle tells the two
-  // apart.
-  LinkState state() noexcept override {
-    if (state_ == LinkState::open) {
-      pollfd look{.fd = handle_, .events = 0, .revents = 0};
-      if (::poll(&look, 1, 0) > 0 && (look.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) {
-        lose("{} has hung up (adapter pulled out, or the far end closed)", device_);
-      }
-    }
-    return state_;
-  }
-
-  std::string_view why() const noexcept override { return why_; }
-
- private:
   // libserialport says "device not found" for whatever it dislikes; the file system knows better.
   bool can_be_opened() {
     if (::access(device_.c_str(), F_OK) != 0) {
@@ -113,14 +123,25 @@ class SerialLink final : public ByteLink {
     return false;
   }
 
-  std::size_t moved(int result) noexcept {
-    if (result >= 0) return static_cast<std::size_t>(result);
-    lose("{}: {}", device_, strerrordesc_np(errno));
+  struct Answer {
+    int count, error;
+  };
+  static Answer answer_of(int result) noexcept { return {result, result < 0 ? errno : 0}; }
+
+  std::size_t moved(const Answer& answer) noexcept {
+    if (answer.count >= 0) return static_cast<std::size_t>(answer.count);
+    // A table of constants.
+    lose("{}: {}", device_, checked_at_run_time([&] { return strerrordesc_np(answer.error); }));
     return 0;
   }
 
-  void release() noexcept {
+  void release() noexcept MOLDLOFT_NONBLOCKING {
     if (port_ == nullptr) return;
+    const PromiseSuspended closing;
+    checked_at_run_time([this] { give_back(); });
+  }
+
+  void give_back() noexcept {
     if (is_open_) sp_close(port_);
     sp_free_port(port_);
     port_ = nullptr;
@@ -129,7 +150,7 @@ class SerialLink final : public ByteLink {
   }
 
   template <typename... Args>
-  void lose(fmt::format_string<Args...> pattern, Args&&... args) noexcept {
+  void lose(TextPattern<Args...> pattern, Args&&... args) noexcept {
     why_ = Message::format(pattern, std::forward<Args>(args)...);
     state_ = LinkState::lost;
     release();

@@ -1,6 +1,8 @@
 #include "hal/tcp_link.hpp"
 
 #include "hal/fixed_text.hpp"
+#include "hal/realtime.hpp"
+#include "hal/realtime_section.hpp"
 
 #include <netdb.h>
 #include <poll.h>
@@ -48,7 +50,40 @@ class TcpLink final : public ByteLink {
   TcpLink(std::string host, std::uint16_t port) : host_{std::move(host)}, port_{port} {}
 
   void open() override {
-    close();
+    const PromiseSuspended opening;
+    checked_at_run_time([this] { connect(); });
+  }
+
+  void close() noexcept override {
+    const PromiseSuspended closing;
+    checked_at_run_time([this] { release(); });
+    state_ = LinkState::closed;
+    why_ = "closed";
+  }
+
+  std::size_t read(std::span<std::byte> out) noexcept override {
+    if (state_ != LinkState::open || out.empty()) return 0;
+    return moved(
+        ask([&](auto& error) { return socket_.read_some(asio::buffer(out.data(), out.size()), error); }));
+  }
+
+  std::size_t write(std::span<const std::byte> in) noexcept override {
+    if (state_ != LinkState::open || in.empty()) return 0;
+    return moved(
+        ask([&](auto& error) { return socket_.write_some(asio::buffer(in.data(), in.size()), error); }));
+  }
+
+  LinkState state() noexcept override {
+    if (state_ == LinkState::opening) look_at_connect();
+    if (state_ == LinkState::open) look_for_hang_up();
+    return state_;
+  }
+
+  std::string_view why() const noexcept override { return why_; }
+
+ private:
+  void connect() {
+    release();
     // Looked up once: reading the hosts file is disk and heap, and a reconnect happens between two ticks.
     if (!address_) address_ = find_address(host_);
     if (!address_) {
@@ -74,48 +109,40 @@ class TcpLink final : public ByteLink {
     }
   }
 
-  void close() noexcept override {
+  void release() noexcept {
     asio::error_code ignored;  // the descriptor is gone whatever close() says
     socket_.close(ignored);
-    state_ = LinkState::closed;
-    why_ = "closed";
   }
 
-  std::size_t read(std::span<std::byte> out) noexcept override {
-    if (state_ != LinkState::open || out.empty()) return 0;
-    asio::error_code error;
-    const std::size_t count = socket_.read_some(asio::buffer(out.data(), out.size()), error);
-    judge(error);
-    return count;
+  // What became of a call on the socket, which does not wait.
+  struct Answer {
+    std::size_t count = 0;
+    int error = 0;
+    bool ended = false;  // the peer has nothing more to say
+  };
+  template <typename Call>
+  static Answer ask(Call&& call) noexcept MOLDLOFT_NONBLOCKING {
+    return answered_at_once([&] {
+      asio::error_code error;
+      const std::size_t count = call(error);
+      return Answer{count, error.value(), error == asio::error::eof};
+    });
   }
 
-  std::size_t write(std::span<const std::byte> in) noexcept override {
-    if (state_ != LinkState::open || in.empty()) return 0;
-    asio::error_code error;
-    const std::size_t count = socket_.write_some(asio::buffer(in.data(), in.size()), error);
-    judge(error);
-    return count;
-  }
-
-  LinkState state() noexcept override {
-    if (state_ == LinkState::opening) look_at_connect();
-    if (state_ == LinkState::open) look_for_hang_up();
-    return state_;
-  }
-
-  std::string_view why() const noexcept override { return why_; }
-
- private:
   short poll_now(short events) noexcept {
-    pollfd look{.fd = socket_.native_handle(), .events = events, .revents = 0};
-    return ::poll(&look, 1, 0) > 0 ? look.revents : short{0};
+    return answered_at_once([&] {
+      pollfd look{.fd = socket_.native_handle(), .events = events, .revents = 0};
+      return ::poll(&look, 1, 0) > 0 ? look.revents : short{0};
+    });
   }
 
   void look_at_connect() noexcept {
     if (poll_now(POLLOUT) == 0) return;
-    int result = 0;
-    socklen_t size = sizeof result;
-    if (getsockopt(socket_.native_handle(), SOL_SOCKET, SO_ERROR, &result, &size) != 0) result = errno;
+    const int result = answered_at_once([&] {
+      int error = 0;
+      socklen_t size = sizeof error;
+      return getsockopt(socket_.native_handle(), SOL_SOCKET, SO_ERROR, &error, &size) == 0 ? error : errno;
+    });
     if (result != 0) {
       lose_to_errno(result);
       return;
@@ -129,33 +156,30 @@ class TcpLink final : public ByteLink {
     const short seen = poll_now(POLLRDHUP);
     if ((seen & (POLLRDHUP | POLLHUP | POLLERR)) == 0) return;
     char next = 0;
-    const auto left = ::recv(socket_.native_handle(), &next, 1, MSG_PEEK | MSG_DONTWAIT);
-    if (left > 0) return;
-    if (left == 0) {
-      lose("{}:{} has closed the connection", host_, port_);
-    } else if (errno != EAGAIN) {
-      lose_to_errno(errno);
-    }
+    moved(ask([&](auto& error) {
+      return socket_.receive(asio::buffer(&next, 1), tcp::socket::message_peek, error);
+    }));
   }
 
-  void judge(const asio::error_code& error) noexcept {
-    if (!error || error == asio::error::would_block || error == asio::error::interrupted) return;
-    if (error == asio::error::eof) {
+  std::size_t moved(const Answer& answer) noexcept {
+    if (answer.ended) {
       lose("{}:{} has closed the connection", host_, port_);
-    } else {
-      lose_to_errno(error.value());
+    } else if (answer.error != 0 && answer.error != EAGAIN && answer.error != EINTR) {
+      lose_to_errno(answer.error);
     }
+    return answer.count;
   }
 
   void lose_to_errno(int error) noexcept {
     const char* hint = error == ECONNREFUSED ? " (is the server running?)" : "";
-    lose("{}:{}: {}{}", host_, port_, strerrordesc_np(error), hint);
+    // A table of constants.
+    const char* what = checked_at_run_time([&] { return strerrordesc_np(error); });
+    lose("{}:{}: {}{}", host_, port_, what, hint);
   }
 
   template <typename... Args>
-  void lose(fmt::format_string<Args...> pattern, Args&&... args) noexcept {
-    asio::error_code ignored;
-    socket_.close(ignored);
+  void lose(TextPattern<Args...> pattern, Args&&... args) noexcept {
+    close();
     state_ = LinkState::lost;
     why_ = Message::format(pattern, std::forward<Args>(args)...);
   }

@@ -13,6 +13,9 @@
 #include <filesystem>
 #include <system_error>
 
+// A simulated device: its descriptors do not wait either, but it promises nothing.
+MOLDLOFT_CHECKED_AT_RUN_TIME
+
 namespace moldloft::host_sim {
 
 using hal::LinkState;

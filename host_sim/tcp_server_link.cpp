@@ -12,6 +12,9 @@
 #include <cstring>
 #include <utility>
 
+// A simulated device: its descriptors do not wait either, but it promises nothing.
+MOLDLOFT_CHECKED_AT_RUN_TIME
+
 namespace moldloft::host_sim {
 
 using hal::LinkState;

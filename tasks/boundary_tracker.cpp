@@ -1,5 +1,7 @@
 #include "tasks/boundary_tracker.hpp"
 
+#include "hal/reserved.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -135,7 +137,7 @@ void BoundaryTracker::remember_edges(const Seen& seen) {
   for (const auto& point : seen.view.points) {
     if (edges_.size() == edges_.capacity())
       return;  // sized for max_shots: only a plate beyond the plan gets here
-    edges_.push_back((seen.world_from_scanner * point.position).head<2>());
+    hal::add_within_reserve(edges_, (seen.world_from_scanner * point.position).head<2>());
   }
 }
 
@@ -145,7 +147,7 @@ void BoundaryTracker::remember_corner(const Vector2d& corner) {
     known = corner;  // the later look has the corner nearer to the middle of the field
     return;
   }
-  if (corners_.size() < corners_.capacity()) corners_.push_back(corner);
+  if (corners_.size() < corners_.capacity()) hal::add_within_reserve(corners_, corner);
 }
 
 void BoundaryTracker::move_front(const Piece& piece) {

@@ -22,6 +22,7 @@
 #include "geometry/edges/boundary_view.hpp"
 #include "geometry/rigid_motion.hpp"
 #include "hal/fixed_text.hpp"
+#include "hal/realtime.hpp"
 #include "tasks/transition.hpp"
 
 namespace moldloft::tasks {
@@ -68,11 +69,11 @@ struct TrackContext {
 };
 
 using TrackTransition = Transition<TrackState, TrackEvent, TrackAction, TrackContext>;
-std::span<const TrackTransition> track_transitions();
+std::span<const TrackTransition> track_transitions() MOLDLOFT_NONBLOCKING;
 std::span<const Ignored<TrackState, TrackEvent>> track_ignored();
-std::string_view to_string(TrackState);
-std::string_view to_string(TrackEvent);
-std::string_view to_string(TrackAction);
+std::string_view to_string(TrackState) MOLDLOFT_NONBLOCKING;
+std::string_view to_string(TrackEvent) MOLDLOFT_NONBLOCKING;
+std::string_view to_string(TrackAction) MOLDLOFT_NONBLOCKING;
 
 struct TrackerSettings {
   double field_half_x_mm = 51, field_half_y_mm = 51;
@@ -92,7 +93,7 @@ class BoundaryTracker {
  public:
   explicit BoundaryTracker(const TrackerSettings&);
 
-  void begin(const ShotPlace& start);
+  void begin(const ShotPlace& start) MOLDLOFT_NONBLOCKING;
 
   struct Seen {
     geometry::RigidMotion world_from_scanner;
@@ -107,7 +108,7 @@ class BoundaryTracker {
     std::optional<ShotPlace> next;  // nothing when closed or failed
     hal::Message text;              // failed: what was seen, what to do
   };
-  Step take(const Seen&);
+  Step take(const Seen&) MOLDLOFT_NONBLOCKING;
 
   TrackState state() const { return state_; }
   // A point on the plate near the field that has just been ordered: the hint for finding the plate there (world).

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "hal/latest_value.hpp"
+#include "hal/realtime.hpp"
 #include "hal/recorder.hpp"
 #include "hal/robot.hpp"
 #include "hal/scanner.hpp"
@@ -82,9 +83,10 @@ class Cell final : public Task {
 
   void command(CellEvent);  // an operator's or line controller's command, taken up in the next tick
   void abort(const hal::Message& why,
-             HoldCause = HoldCause::person);  // on the control thread: what is dangerous
-  bool waits_for_sending() const { return frame_decided_; }
-  void commands_sent(Instant now);  // on the control thread, when the robot's driver has written what it had
+             HoldCause = HoldCause::person) MOLDLOFT_NONBLOCKING;  // on the control thread: what is dangerous
+  bool waits_for_sending() const MOLDLOFT_NONBLOCKING { return frame_decided_; }
+  // On the control thread, when the robot's driver has written what it had.
+  void commands_sent(Instant now) MOLDLOFT_NONBLOCKING;
   CellProgress progress() const { return published_.get(); }
   CellState state() const { return state_; }
   Phase phase() const { return phase_; }
@@ -122,48 +124,48 @@ class Cell final : public Task {
   enum class StartStep : std::uint8_t { devices, calibrating, done };
 
   // cell.cpp: the supervisor
-  void apply(CellEvent, const hal::Message& text = {});
-  void enter(CellAction);
-  void hold(HoldCause, const hal::Message&);
-  void on_robot(const hal::RobotEvent&);
-  void on_scanner(const hal::ScannerEvent&);
-  void advance_state();
-  void start_devices();
-  std::optional<hal::Message> refuse_scanner() const;
-  bool scanner_ready() const;
-  bool devices_ready() const;
-  void account();
-  void publish();
+  void apply(CellEvent, const hal::Message& text = {}) MOLDLOFT_NONBLOCKING;
+  void enter(CellAction) MOLDLOFT_NONBLOCKING;
+  void hold(HoldCause, const hal::Message&) MOLDLOFT_NONBLOCKING;
+  void on_robot(const hal::RobotEvent&) MOLDLOFT_NONBLOCKING;
+  void on_scanner(const hal::ScannerEvent&) MOLDLOFT_NONBLOCKING;
+  void advance_state() MOLDLOFT_NONBLOCKING;
+  void start_devices() MOLDLOFT_NONBLOCKING;
+  std::optional<hal::Message> refuse_scanner() const MOLDLOFT_NONBLOCKING;
+  bool scanner_ready() const MOLDLOFT_NONBLOCKING;
+  bool devices_ready() const MOLDLOFT_NONBLOCKING;
+  void account() MOLDLOFT_NONBLOCKING;
+  void publish() MOLDLOFT_NONBLOCKING;
   void record(std::string_view source, std::string_view event, std::string_view from, std::string_view to,
-              const hal::Message& text = {});
+              const hal::Message& text = {}) MOLDLOFT_NONBLOCKING;
 
   // cell_shots.cpp: one shot after another
-  void want(const ShotPlace&, hal::ShotPurpose);
-  void sequence();
-  void apply(ShotEvent);
-  void carry_out(ShotAction);
-  void drive();
-  bool pick_pose(Order&);
-  void trigger();
-  void deliver();
-  void give_up(const hal::Message&);
-  bool deliver_archived();
-  void skip_given_up();
-  bool frame_is_done() const;
-  bool may_expose() const;
-  Eigen::Vector3d hint_in_world(const Order&) const;
+  void want(const ShotPlace&, hal::ShotPurpose) MOLDLOFT_NONBLOCKING;
+  void sequence() MOLDLOFT_NONBLOCKING;
+  void apply(ShotEvent) MOLDLOFT_NONBLOCKING;
+  void carry_out(ShotAction) MOLDLOFT_NONBLOCKING;
+  void drive() MOLDLOFT_NONBLOCKING;
+  bool pick_pose(Order&) MOLDLOFT_NONBLOCKING;
+  void trigger() MOLDLOFT_NONBLOCKING;
+  void deliver() MOLDLOFT_NONBLOCKING;
+  void give_up(const hal::Message&) MOLDLOFT_NONBLOCKING;
+  bool deliver_archived() MOLDLOFT_NONBLOCKING;
+  void skip_given_up() MOLDLOFT_NONBLOCKING;
+  bool frame_is_done() const MOLDLOFT_NONBLOCKING;
+  bool may_expose() const MOLDLOFT_NONBLOCKING;
+  Eigen::Vector3d hint_in_world(const Order&) const MOLDLOFT_NONBLOCKING;
 
   // cell_phases.cpp: what happens inside Execute
-  void set_phase(Phase);
-  void measure();
-  void advance_phase();
-  void look_at(const Order&, const hal::Frame&, hal::Scanner* unpacks);
-  void use_shot();
-  std::optional<double> learn_heights(const geometry::RigidMotion& world_from_scanner);
+  void set_phase(Phase) MOLDLOFT_NONBLOCKING;
+  void measure() MOLDLOFT_NONBLOCKING;
+  void advance_phase() MOLDLOFT_NONBLOCKING;
+  void look_at(const Order&, const hal::Frame&, hal::Scanner* unpacks) MOLDLOFT_NONBLOCKING;
+  void use_shot() MOLDLOFT_NONBLOCKING;
+  std::optional<double> learn_heights(const geometry::RigidMotion& world_from_scanner) MOLDLOFT_NONBLOCKING;
   void use_boundary_shot(const Order&, const geometry::RigidMotion& world_from_scanner,
-                         std::optional<double> plate_z_mm);
-  void plan_surface();
-  void next_surface_shot();
+                         std::optional<double> plate_z_mm) MOLDLOFT_NONBLOCKING;
+  void plan_surface() MOLDLOFT_NONBLOCKING;
+  void next_surface_shot() MOLDLOFT_NONBLOCKING;
 
   CellSettings settings_;
   Clock& clock_;

@@ -1,4 +1,5 @@
 // What happens inside Execute: seek the edge, track the boundary, plan, scan, finish the fit.
+#include "hal/reserved.hpp"
 #include "tasks/cell.hpp"
 #include "tasks/tool_pose.hpp"
 
@@ -77,11 +78,12 @@ void Cell::look_at(const Order& order, const hal::Frame& frame, hal::Scanner* un
   ++taken_[static_cast<std::size_t>(order.purpose)];
   points_seen_ += frame.point_count;
   looked_at_ = order;
-  const geometry::RigidMotion world_from_scanner = motion_of(order.reported) * settings_.tip_from_scanner;
+  const geometry::RigidMotion world_from_scanner =
+      scanner_motion_at(order.reported, settings_.tip_from_scanner);
   // Nobody knows a plate's height before it was seen; from then on the hint is good to a step's slope.
   const double reach = order.purpose == ShotPurpose::seek ? settings_.depth_mm : hint_reach_mm;
   view_.begin(frame,
-              {.hint = world_from_scanner.inverse() * hint_in_world(order),
+              {.hint = into_scanner(world_from_scanner, hint_in_world(order)),
                .reach_mm = reach,
                .boundary = order.purpose != ShotPurpose::surface},
               unpacks);
@@ -92,12 +94,13 @@ void Cell::look_at(const Order& order, const hal::Frame& frame, hal::Scanner* un
 void Cell::use_shot() {
   looking_ = false;
   const Order& order = looked_at_;
-  const geometry::RigidMotion world_from_scanner = motion_of(order.reported) * settings_.tip_from_scanner;
+  const geometry::RigidMotion world_from_scanner =
+      scanner_motion_at(order.reported, settings_.tip_from_scanner);
   if (order.purpose == ShotPurpose::surface) {
     if (view_.found()) surface_.fold(view_, world_from_scanner);
     return;
   }
-  boundary_places_.push_back(order.place);
+  hal::add_within_reserve(boundary_places_, order.place);
   const std::optional<double> height = view_.found() ? learn_heights(world_from_scanner) : std::nullopt;
   if (height) surface_.keep(view_, world_from_scanner);
   use_boundary_shot(order, world_from_scanner, height);

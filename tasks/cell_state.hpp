@@ -6,6 +6,7 @@
 #include <span>
 #include <string_view>
 
+#include "hal/realtime.hpp"
 #include "tasks/transition.hpp"
 
 namespace moldloft::tasks {
@@ -61,15 +62,15 @@ struct CellContext {
 };
 
 using CellTransition = Transition<CellState, CellEvent, CellAction, CellContext>;
-std::span<const CellTransition> cell_transitions();
+std::span<const CellTransition> cell_transitions() MOLDLOFT_NONBLOCKING;
 std::span<const Ignored<CellState, CellEvent>> cell_ignored();
 
-std::string_view to_string(CellState);
-std::string_view to_string(CellEvent);
+std::string_view to_string(CellState) MOLDLOFT_NONBLOCKING;
+std::string_view to_string(CellEvent) MOLDLOFT_NONBLOCKING;
 std::string_view to_string(CellAction);
 
 // Inside Execute.
 enum class Phase : std::uint8_t { none, seek_edge, track_boundary, plan_scan, scan_surface, finish_fit };
-std::string_view to_string(Phase);
+std::string_view to_string(Phase) MOLDLOFT_NONBLOCKING;
 
 }  // namespace moldloft::tasks

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "hal/clock.hpp"
+#include "hal/realtime.hpp"
 
 namespace moldloft::tasks {
 
@@ -24,8 +25,8 @@ class ClockDrift {
  public:
   // `ours` and `theirs` belong to one event, as exactly as its report allows; in order of time. A device that has
   // restarted counts anew: reset() then.
-  void add(hal::Instant ours, std::uint64_t theirs_ns) noexcept;
-  void reset() noexcept { *this = ClockDrift{}; }
+  void add(hal::Instant ours, std::uint64_t theirs_ns) noexcept MOLDLOFT_NONBLOCKING;
+  void reset() noexcept MOLDLOFT_NONBLOCKING { *this = ClockDrift{}; }
   std::optional<ClockDriftEstimate> estimate() const noexcept;
 
  private:

@@ -2,6 +2,10 @@
 
 #include <Eigen/Cholesky>
 
+// Fixed-size Eigen throughout: constants that it keeps in local statics, and function pointers in its reductions, hide
+// from the compiler that nothing here waits or allocates.
+MOLDLOFT_CHECKED_AT_RUN_TIME
+
 namespace moldloft::tasks {
 namespace {
 

@@ -5,6 +5,8 @@
 // Frame world, mm, coordinates taken relative to the first point. No allocation; add() 40 ns, at() solves 6 x 6.
 #pragma once
 
+#include "hal/realtime.hpp"
+
 #include <Eigen/Core>
 
 namespace moldloft::tasks {
@@ -12,9 +14,9 @@ namespace moldloft::tasks {
 class HeightModel {
  public:
   void reset() { *this = HeightModel{}; }
-  void add(const Eigen::Vector3d& world_point);
-  void solve();  // call before at(), after the last add()
-  double at(double x_mm, double y_mm) const;
+  void add(const Eigen::Vector3d& world_point) MOLDLOFT_NONBLOCKING;
+  void solve() MOLDLOFT_NONBLOCKING;  // call before at(), after the last add()
+  double at(double x_mm, double y_mm) const MOLDLOFT_NONBLOCKING;
   bool empty() const { return count_ == 0; }
 
  private:

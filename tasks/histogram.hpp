@@ -7,6 +7,8 @@
 // Cost         add() about 2 ns
 #pragma once
 
+#include "hal/realtime.hpp"
+
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -17,7 +19,7 @@ class Histogram {
  public:
   using Duration = std::chrono::nanoseconds;
 
-  void add(Duration value) noexcept;  // negative values count as zero
+  void add(Duration value) noexcept MOLDLOFT_NONBLOCKING;  // negative values count as zero
   void merge(const Histogram& other) noexcept;
   void reset() noexcept { *this = Histogram{}; }
 

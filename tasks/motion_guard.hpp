@@ -9,6 +9,7 @@
 
 #include "hal/fixed_text.hpp"
 #include "hal/pose.hpp"
+#include "hal/realtime.hpp"
 
 namespace moldloft::tasks {
 
@@ -26,6 +27,6 @@ struct Workspace {
 
 // Nothing when the target may be sent; else one line: which limit, by how much.
 std::optional<hal::Message> refuse_target(const hal::Pose& target, const hal::Pose& standing,
-                                          int speed_percent, const Workspace& workspace);
+                                          int speed_percent, const Workspace& workspace) MOLDLOFT_NONBLOCKING;
 
 }  // namespace moldloft::tasks

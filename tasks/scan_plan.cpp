@@ -5,6 +5,10 @@
 #include <cmath>
 #include <numbers>
 
+// Fixed-size Eigen throughout: constants that it keeps in local statics, and function pointers in its reductions, hide
+// from the compiler that nothing here waits or allocates.
+MOLDLOFT_CHECKED_AT_RUN_TIME
+
 namespace moldloft::tasks {
 namespace {
 

@@ -10,8 +10,9 @@
 #include <expected>
 #include <span>
 
-#include "geometry/error.hpp"
 #include "geometry/edges/outline.hpp"
+#include "geometry/error.hpp"
+#include "hal/realtime.hpp"
 #include "tasks/boundary_tracker.hpp"
 #include "tasks/height_model.hpp"
 
@@ -29,6 +30,6 @@ std::expected<std::size_t, geometry::Error> plan_zigzag(const geometry::Outline&
                                                         const HeightModel& heights,
                                                         const ScanPlanSettings& settings,
                                                         const Eigen::Vector2d& from, double head_yaw_now,
-                                                        std::span<ShotPlace> places);
+                                                        std::span<ShotPlace> places) MOLDLOFT_NONBLOCKING;
 
 }  // namespace moldloft::tasks

@@ -26,6 +26,7 @@
 #include <string_view>
 
 #include "hal/flight_recorder.hpp"
+#include "hal/realtime.hpp"
 #include "tasks/task_record.hpp"
 
 namespace moldloft::tasks {
@@ -69,7 +70,7 @@ class Scheduler {
   std::uint64_t heartbeat() const noexcept {
     return heartbeat_.load(std::memory_order_relaxed);
   }                                          // ticks done
-  std::string_view name_of(int task) const;  // a constant after the last add*()
+  std::string_view name_of(int task) const MOLDLOFT_NONBLOCKING;  // a constant after the last add*()
 
   // ---- on the control thread, or when it has come to rest
   std::uint64_t ticks() const noexcept { return ticks_; }
@@ -95,13 +96,13 @@ class Scheduler {
   const SchedulerSettings& settings() const { return settings_; }
 
  private:
-  void run_table(Instant tick_start, Instant& t);
-  void count_run(std::size_t i, Instant began, Duration cost, Instant allowed_start);
-  void run_background(Instant& t, Instant limit);
-  bool step_background(std::size_t i, Instant& t, Instant limit, bool& may_force);
-  bool count_missed(Instant t);
-  void keep_miss(Instant t, std::uint64_t lost);
-  void count_slips(std::uint64_t lost);
+  void run_table(Instant tick_start, Instant& t) MOLDLOFT_NONBLOCKING;
+  void count_run(std::size_t i, Instant began, Duration cost, Instant allowed_start) MOLDLOFT_NONBLOCKING;
+  void run_background(Instant& t, Instant limit) MOLDLOFT_NONBLOCKING;
+  bool step_background(std::size_t i, Instant& t, Instant limit, bool& may_force) MOLDLOFT_NONBLOCKING;
+  bool count_missed(Instant t) MOLDLOFT_NONBLOCKING;
+  void keep_miss(Instant t, std::uint64_t lost) MOLDLOFT_NONBLOCKING;
+  void count_slips(std::uint64_t lost) MOLDLOFT_NONBLOCKING;
   bool warm() const noexcept { return ticks_ > settings_.warm_up_ticks; }
 
   Clock& clock_;

@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "hal/frame.hpp"
+#include "hal/realtime.hpp"
 #include "hal/run_record.hpp"
 
 namespace moldloft::tasks {
@@ -21,9 +22,9 @@ class ShotArchive {
  public:
   virtual ~ShotArchive() = default;
   // The shot with this number in the run, counted from 1; nothing when it was not taken.
-  virtual const ArchivedShot* find(std::uint32_t number) const = 0;
+  virtual const ArchivedShot* find(std::uint32_t number) const MOLDLOFT_NONBLOCKING = 0;
   // The highest number that was taken, 0 for none. A number below it that is not there was given up at the time.
-  virtual std::uint32_t last() const = 0;
+  virtual std::uint32_t last() const MOLDLOFT_NONBLOCKING = 0;
 };
 
 // Shot ids on the wire carry the shot's number in the run in their low bits and the run's epoch above: two runs, or one

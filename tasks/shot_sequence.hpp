@@ -9,6 +9,7 @@
 #include <span>
 #include <string_view>
 
+#include "hal/realtime.hpp"
 #include "tasks/transition.hpp"
 
 namespace moldloft::tasks {
@@ -47,11 +48,11 @@ enum class ShotAction : std::uint8_t {
 
 struct ShotContext {};
 using ShotTransition = Transition<ShotState, ShotEvent, ShotAction, ShotContext>;
-std::span<const ShotTransition> shot_transitions();
+std::span<const ShotTransition> shot_transitions() MOLDLOFT_NONBLOCKING;
 std::span<const Ignored<ShotState, ShotEvent>> shot_ignored();
 
-std::string_view to_string(ShotState);
-std::string_view to_string(ShotEvent);
+std::string_view to_string(ShotState) MOLDLOFT_NONBLOCKING;
+std::string_view to_string(ShotEvent) MOLDLOFT_NONBLOCKING;
 std::string_view to_string(ShotAction);
 
 }  // namespace moldloft::tasks

@@ -1,5 +1,7 @@
 #include "tasks/shot_view.hpp"
 
+#include "hal/reserved.hpp"
+
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -34,7 +36,8 @@ void ShotView::begin(const hal::Frame& frame, const Request& request, hal::Scann
     const auto column = [&](const std::vector<float>& c) {
       return std::span{c}.subspan(line.first, line.count);
     };
-    stripes_.push_back({column(frame.x), column(frame.y), column(frame.z)});
+    hal::add_within_reserve(stripes_,
+                            geometry::StripeView{column(frame.x), column(frame.y), column(frame.z)});
   }
   // A frame beyond the memory plan cannot come: the driver was told the same limits.
   const auto begun = finder_.begin(stripes_);

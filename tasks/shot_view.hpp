@@ -12,6 +12,7 @@
 
 #include "geometry/edges/boundary_view.hpp"
 #include "geometry/edges/plate_runs.hpp"
+#include "hal/realtime.hpp"
 #include "hal/scanner.hpp"
 
 namespace moldloft::tasks {
@@ -35,8 +36,8 @@ class ShotView {
   };
   // Looks at a frame, which must stay as it is. `unpacks`, when given, holds points of it that are still packed.
   // In bounded pieces: begin(), then step() until it says true, then found() and the rest may be asked.
-  void begin(const hal::Frame& frame, const Request&, hal::Scanner* unpacks = nullptr);
-  bool step();
+  void begin(const hal::Frame& frame, const Request&, hal::Scanner* unpacks = nullptr) MOLDLOFT_NONBLOCKING;
+  bool step() MOLDLOFT_NONBLOCKING;
   bool found() const { return !runs_.empty(); }
 
   const geometry::BoundaryViewer::View& boundary() const { return boundary_; }
@@ -44,15 +45,15 @@ class ShotView {
 
   // Walks through the good points on the plate, away from its edges. next() fills `out` with as many as fit and returns
   // how many; 0 when all have been given. Takes every `stride`-th stripe and point.
-  void rewind(std::uint32_t stride);
-  std::size_t next(std::span<Eigen::Vector3d> out);
+  void rewind(std::uint32_t stride) MOLDLOFT_NONBLOCKING;
+  std::size_t next(std::span<Eigen::Vector3d> out) MOLDLOFT_NONBLOCKING;
 
   std::size_t bytes() const;
 
  private:
   enum class Stage : std::uint8_t { unpack, cut, find, boundary, done };
   static constexpr std::size_t points_a_step = 2048, stripes_a_step = 2, runs_a_step = 16;
-  bool end();
+  bool end() MOLDLOFT_NONBLOCKING;
   bool within_margins(const geometry::PlateRun&, std::uint32_t point) const;
   bool is_outlier(const geometry::PlateRun&, std::uint32_t point) const;
 

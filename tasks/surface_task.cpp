@@ -1,5 +1,7 @@
 #include "tasks/surface_task.hpp"
 
+#include "hal/reserved.hpp"
+
 #include <algorithm>
 
 namespace moldloft::tasks {
@@ -37,11 +39,12 @@ void SurfaceTask::step_keep() {
     const std::size_t count = keeping_from_->next(
         std::span{chunk_}.first(std::min({left, keep_end_ - reserve_.size(), chunk_.size()})));
     if (count == 0) break;
-    for (std::size_t i = 0; i < count; ++i) reserve_.push_back(world_from_scanner_ * chunk_[i]);
+    for (std::size_t i = 0; i < count; ++i)
+      hal::add_within_reserve(reserve_, world_from_scanner_ * chunk_[i]);
     left -= count;
   }
   if (left == 0 && reserve_.size() < keep_end_) return;
-  reserve_ends_.push_back(reserve_.size());
+  hal::add_within_reserve(reserve_ends_, reserve_.size());
   keeping_from_ = nullptr;
 }
 

@@ -22,6 +22,7 @@
 #include "geometry/fit/plan_map.hpp"
 #include "geometry/fit/surface_fit.hpp"
 #include "geometry/rigid_motion.hpp"
+#include "hal/realtime.hpp"
 #include "tasks/scheduler.hpp"
 #include "tasks/shot_view.hpp"
 
@@ -53,20 +54,20 @@ class SurfaceTask final : public BackgroundTask {
 
   explicit SurfaceTask(const SurfaceTaskSettings&);
 
-  void begin();
+  void begin() MOLDLOFT_NONBLOCKING;
   // Looks at the frame that `shot` has begun; looking() turns false when its view is there. Goes before all else.
   void look(ShotView& shot) { looking_at_ = &shot; }
   bool looking() const { return looking_at_ != nullptr; }
   // Keeps a thinned copy of the plate's points of a boundary shot; `shot` and its frame stay untouched by others as
   // long as keeping() says true. Goes before the work on the outline.
-  void keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner);
-  bool keeping() const { return keeping_from_ != nullptr; }
+  void keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner) MOLDLOFT_NONBLOCKING;
+  bool keeping() const MOLDLOFT_NONBLOCKING { return keeping_from_ != nullptr; }
   // `corner_candidates`: what the tracker took for corners; more than four is no harm.
   void build_outline(std::span<const Eigen::Vector2d> edges,
-                     std::span<const Eigen::Vector2d> corner_candidates);
+                     std::span<const Eigen::Vector2d> corner_candidates) MOLDLOFT_NONBLOCKING;
   // Folds a surface shot in; `shot` and its frame stay untouched by others until stage() is open again.
-  void fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner);
-  void solve();
+  void fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner) MOLDLOFT_NONBLOCKING;
+  void solve() MOLDLOFT_NONBLOCKING;
 
   bool has_work() const override;
   void step(Instant deadline) override;
@@ -90,7 +91,7 @@ class SurfaceTask final : public BackgroundTask {
   static constexpr std::size_t chunk_points = 96, kept_points = 384;
 
   void fail(geometry::Error error);
-  void step_keep();
+  void step_keep() MOLDLOFT_NONBLOCKING;
   void step_corners();
   void step_outline();
   void step_reserve();

@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "hal/clock.hpp"
+#include "hal/realtime.hpp"
 
 namespace moldloft::tasks {
 
@@ -25,7 +26,7 @@ using namespace std::chrono_literals;
 class Task {
  public:
   virtual ~Task() = default;
-  virtual void run(Instant now) = 0;  // `now`: the clock's reading at the task's start
+  virtual void run(Instant now) MOLDLOFT_NONBLOCKING = 0;  // `now`: the clock's reading at the task's start
 };
 
 // A task made of a callable: for the rows of the table that only call one function of a driver.
@@ -33,7 +34,7 @@ template <typename Function>
 class FunctionTask final : public Task {
  public:
   explicit FunctionTask(Function function) : function_{function} {}
-  void run(Instant now) override { function_(now); }
+  void run(Instant now) MOLDLOFT_NONBLOCKING override { function_(now); }
 
  private:
   Function function_;
@@ -42,10 +43,10 @@ class FunctionTask final : public Task {
 class BackgroundTask {
  public:
   virtual ~BackgroundTask() = default;
-  virtual bool has_work() const = 0;
+  virtual bool has_work() const MOLDLOFT_NONBLOCKING = 0;
   // One bounded piece of work. `deadline` - now is the time left: a task that can work in slices fills it and
   // returns before it; it is never nearer than the declared quantum.
-  virtual void step(Instant deadline) = 0;
+  virtual void step(Instant deadline) MOLDLOFT_NONBLOCKING = 0;
 };
 
 enum class Criticality { vital, ordinary };  // an overrun of a vital task freezes the flight recorder

@@ -3,6 +3,10 @@
 #include <cmath>
 #include <numbers>
 
+// Fixed-size Eigen throughout: constants that it keeps in local statics, and function pointers in its reductions, hide
+// from the compiler that nothing here waits or allocates.
+MOLDLOFT_CHECKED_AT_RUN_TIME
+
 namespace moldloft::tasks {
 
 using geometry::RigidMotion;
@@ -12,6 +16,14 @@ RigidMotion motion_of(const hal::Pose& p) {
   motion.linear() = geometry::rotation_from_zyz({p.yaw, p.pitch, p.roll});
   motion.translation() << p.x_mm, p.y_mm, p.z_mm;
   return motion;
+}
+
+RigidMotion scanner_motion_at(const hal::Pose& world_from_tip, const RigidMotion& tip_from_scanner) {
+  return motion_of(world_from_tip) * tip_from_scanner;
+}
+
+Eigen::Vector3d into_scanner(const RigidMotion& world_from_scanner, const Eigen::Vector3d& in_world) {
+  return world_from_scanner.inverse() * in_world;
 }
 
 hal::Pose pose_of(const RigidMotion& motion) {

@@ -9,10 +9,12 @@ using S = TrackState;
 using E = TrackEvent;
 using A = TrackAction;
 constexpr auto any = always<TrackContext>;
-constexpr bool may_seek(const TrackContext& c) { return c.seek_steps < c.max_seek_steps; }
-constexpr bool may_turn(const TrackContext& c) { return c.turns < c.max_turns; }
-constexpr bool may_back(const TrackContext& c) { return c.backs < c.max_backs; }
-constexpr bool has_shots(const TrackContext& c) { return c.shots < c.max_shots; }
+constexpr bool may_seek(const TrackContext& c) MOLDLOFT_NONBLOCKING {
+  return c.seek_steps < c.max_seek_steps;
+}
+constexpr bool may_turn(const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.turns < c.max_turns; }
+constexpr bool may_back(const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.backs < c.max_backs; }
+constexpr bool has_shots(const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.shots < c.max_shots; }
 
 // clang-format off
 constexpr TrackTransition table[] = {

@@ -9,19 +9,21 @@
 
 #include <span>
 
+#include "hal/realtime.hpp"
+
 namespace moldloft::tasks {
 
 template <typename State, typename Event, typename Action, typename Context>
 struct Transition {
   State from;
   Event on;
-  bool (*guard)(const Context&);
+  bool (*guard)(const Context&) MOLDLOFT_NONBLOCKING;
   Action action;
   State to;
 };
 
 template <typename Context>
-constexpr bool always(const Context&) {
+constexpr bool always(const Context&) MOLDLOFT_NONBLOCKING {
   return true;
 }
 
@@ -34,7 +36,7 @@ struct Ignored {  // this event means nothing in this state, and that is intende
 template <typename State, typename Event, typename Action, typename Context>
 const Transition<State, Event, Action, Context>* find_transition(
     std::span<const Transition<State, Event, Action, Context>> table, State from, Event on,
-    const Context& context) {
+    const Context& context) MOLDLOFT_NONBLOCKING {
   for (const auto& row : table) {
     if (row.from == from && row.on == on && row.guard(context)) return &row;
   }

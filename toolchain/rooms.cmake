@@ -28,4 +28,7 @@ function(moldloft_room name)
   target_include_directories(moldloft_${name} PUBLIC $<BUILD_INTERFACE:${view}>)
   target_link_libraries(moldloft_${name} PUBLIC ${ROOM_PUBLIC}
     PRIVATE $<BUILD_INTERFACE:moldloft_build_options> ${ROOM_PRIVATE})
+  # A function that is marked as non-blocking and calls what may wait or allocate is an error in every room.
+  target_compile_options(moldloft_${name} PRIVATE
+    $<$<AND:$<COMPILE_LANG_AND_ID:CXX,Clang>,$<VERSION_GREATER_EQUAL:$<CXX_COMPILER_VERSION>,20>>:-Werror=function-effects>)
 endfunction()

@@ -14,6 +14,8 @@ if [ "${1-}" = --tests ]; then
   # OpenCASCADE, which reads our STEP and IGES files back: 180 MiB where X11 is there already, 384 MB on an empty system.
   # Where it is missing its tests are left out of the build, nothing else changes.
   packages+=(libocct-data-exchange-dev)
+  # Clang, whose checks prove that the control thread does not wait: 50 MiB to fetch, 280 MiB installed.
+  packages+=(clang-22 libclang-rt-22-dev)
   # The Debian package (its dependencies named by dpkg-dev, its unit checked by systemd), and the emulated cell PC, whose
   # kernel is taken out of its package.
   packages+=(dpkg-dev systemd python3 cpio busybox-static rt-tests qemu-system-x86)

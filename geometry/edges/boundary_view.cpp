@@ -7,6 +7,9 @@
 
 #include "geometry/edges/edge_lines.hpp"
 
+// Vectors grow within what their constructor has reserved, which the compiler cannot know.
+MOLDLOFT_GEOMETRY_CHECKED_AT_RUN_TIME
+
 namespace moldloft::geometry {
 
 namespace {

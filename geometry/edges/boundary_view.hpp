@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "geometry/edges/plate_runs.hpp"
+#include "geometry/nonblocking.hpp"
 
 namespace moldloft::geometry {
 
@@ -67,13 +68,14 @@ class BoundaryViewer {
     std::optional<double> hidden_low_x_mm, hidden_high_x_mm;
   };
   View look(std::span<const PlateRun> runs, std::size_t stripe_count,
-            const BoundaryViewSettings&);  // valid until the next call
+            const BoundaryViewSettings&) MOLDLOFT_GEOMETRY_NONBLOCKING;  // valid until the next call
 
   // The same in bounded pieces: begin(), step() until it says true, view(). A step goes over one piece of the
   // boundary once.
-  void begin(std::span<const PlateRun> runs, std::size_t stripe_count, const BoundaryViewSettings&);
-  bool step();
-  const View& view() const { return view_; }
+  void begin(std::span<const PlateRun> runs, std::size_t stripe_count,
+             const BoundaryViewSettings&) MOLDLOFT_GEOMETRY_NONBLOCKING;
+  bool step() MOLDLOFT_GEOMETRY_NONBLOCKING;
+  const View& view() const MOLDLOFT_GEOMETRY_NONBLOCKING { return view_; }
 
   std::size_t bytes() const;
 

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <numbers>
 
+// Vectors grow within what their constructor has reserved, which the compiler cannot know.
+MOLDLOFT_GEOMETRY_CHECKED_AT_RUN_TIME
+
 namespace moldloft::geometry {
 namespace {
 

@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "geometry/error.hpp"
+#include "geometry/nonblocking.hpp"
 
 namespace moldloft::geometry {
 
@@ -37,8 +38,9 @@ class CornerChoice {
   explicit CornerChoice(const CornerChoiceSettings&);
 
   // Both spans are the caller's and must stay until the work is done.
-  void begin(std::span<const Eigen::Vector2d> edges, std::span<const Eigen::Vector2d> candidates);
-  std::expected<bool, Error> step();  // true when the corners are chosen
+  void begin(std::span<const Eigen::Vector2d> edges,
+             std::span<const Eigen::Vector2d> candidates) MOLDLOFT_GEOMETRY_NONBLOCKING;
+  std::expected<bool, Error> step() MOLDLOFT_GEOMETRY_NONBLOCKING;  // true when the corners are chosen
   // Counter-clockwise; the side from the first to the second is one of the longer pair.
   const std::array<Eigen::Vector2d, 4>& corners() const { return corners_; }
   std::size_t bytes() const;

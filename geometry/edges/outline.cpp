@@ -6,6 +6,10 @@
 #include <cmath>
 #include <limits>
 
+// Vectors grow within what their constructor has reserved, and matrices of a size known only at run time have
+// their most in their type: the compiler cannot know.
+MOLDLOFT_GEOMETRY_CHECKED_AT_RUN_TIME
+
 namespace moldloft::geometry {
 
 namespace {
@@ -76,6 +80,8 @@ struct OutlineBuilder::SidePass {
 OutlineBuilder::OutlineBuilder(std::size_t max_points, const OutlineSettings& settings)
     : settings_(settings) {
   assert(settings.spans >= 1 && settings.spans <= most_spans);
+  // Eigen asks the processor for its cache sizes once, behind a lock: here, or it would be in the middle of a step.
+  Eigen::initParallel();
   side_of_.reserve(max_points);
   order_.reserve(max_points);
   residual_.reserve(max_points);

@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "geometry/error.hpp"
+#include "geometry/nonblocking.hpp"
 #include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
@@ -49,8 +50,9 @@ class OutlineBuilder {
   // `corner_hints`: the tracker's corners, counter-clockwise, good to a few millimetres. The points are the
   // caller's and must stay until the work is done.
   std::expected<void, Error> begin(std::span<const Eigen::Vector2d> points,
-                                   std::span<const Eigen::Vector2d> corner_hints);
-  std::expected<bool, Error> step();  // true when the outline is ready
+                                   std::span<const Eigen::Vector2d> corner_hints)
+      MOLDLOFT_GEOMETRY_NONBLOCKING;
+  std::expected<bool, Error> step() MOLDLOFT_GEOMETRY_NONBLOCKING;  // true when the outline is ready
   const Outline& outline() const { return outline_; }
   std::size_t bytes() const;
 

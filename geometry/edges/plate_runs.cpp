@@ -8,6 +8,9 @@
 #include "geometry/edges/stripe_line.hpp"
 #include "geometry/edges/stripe_walk.hpp"
 
+// Vectors grow within what their constructor has reserved, which the compiler cannot know.
+MOLDLOFT_GEOMETRY_CHECKED_AT_RUN_TIME
+
 namespace moldloft::geometry {
 
 namespace {

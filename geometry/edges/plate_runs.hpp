@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "geometry/error.hpp"
+#include "geometry/nonblocking.hpp"
 
 namespace moldloft::geometry {
 
@@ -73,11 +74,12 @@ class PlateRunFinder {
 
   // The same in bounded pieces: begin(), cut_stripes() until it says true (4 us a stripe), then find_plate() until
   // it says true (0.2 us a run), plate_runs(). The stripes are the caller's and must stay until then.
-  std::expected<void, Error> begin(std::span<const StripeView> stripes);
-  std::expected<bool, Error> cut_stripes(std::size_t at_most, const PlateRunSettings& settings);
+  std::expected<void, Error> begin(std::span<const StripeView> stripes) MOLDLOFT_GEOMETRY_NONBLOCKING;
+  std::expected<bool, Error> cut_stripes(std::size_t at_most,
+                                         const PlateRunSettings& settings) MOLDLOFT_GEOMETRY_NONBLOCKING;
   std::expected<bool, Error> find_plate(std::size_t at_most_runs, const Eigen::Vector3d& hint,
-                                        const PlateRunSettings& settings);
-  std::span<const PlateRun> plate_runs() const { return found_; }
+                                        const PlateRunSettings& settings) MOLDLOFT_GEOMETRY_NONBLOCKING;
+  std::span<const PlateRun> plate_runs() const MOLDLOFT_GEOMETRY_NONBLOCKING { return found_; }
 
   std::size_t bytes() const;
 

@@ -8,6 +8,9 @@
 #include <cmath>
 #include <limits>
 
+// Curves are assigned into room of the same size: the compiler cannot know.
+MOLDLOFT_GEOMETRY_CHECKED_AT_RUN_TIME
+
 namespace moldloft::geometry {
 
 namespace {

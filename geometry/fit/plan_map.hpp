@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "geometry/edges/outline.hpp"
+#include "geometry/nonblocking.hpp"
 #include "geometry/simd.hpp"
 
 namespace moldloft::geometry {
@@ -36,10 +37,12 @@ class PlanMap {
  public:
   explicit PlanMap(int spans = OutlineSettings{}.spans);  // has room for sides of so many spans
   explicit PlanMap(const Outline& outline);
-  void assign(const Outline& outline);  // without allocation while there is room
+  void assign(const Outline& outline)
+      MOLDLOFT_GEOMETRY_NONBLOCKING;  // without allocation while there is room
 
   PlanPoint at(double u, double v) const;
-  std::expected<void, Error> check() const;  // Jacobian positive on a 65 x 65 grid
+  std::expected<void, Error> check() const
+      MOLDLOFT_GEOMETRY_NONBLOCKING;  // Jacobian positive on a 65 x 65 grid
   // (u, v) of a plan position, starting from `guess`; outside [0, 1]^2 by at most `margin` it is still given.
   std::expected<Eigen::Vector2d, Error> invert(const Eigen::Vector2d& xy, const Eigen::Vector2d& guess,
                                                double margin = 0.0) const;

@@ -110,7 +110,7 @@ void ShotOffsets::add(int shot, const PointBlock& block) {
 
 void ShotOffsets::coarsen(int slot, const MomentGrid& to, std::size_t first, std::size_t end) {
   const int halves_u = level_u_ / to.cells_u(), halves_v = level_v_ / to.cells_v();
-  static const std::array<std::array<std::array<double, 4>, 4>, 3> part{
+  static constexpr std::array<std::array<std::array<double, 4>, 4>, 3> part{
       restriction<3>(0, 0.5), restriction<3>(0.5, 1), restriction<3>(0, 1)};
   Slot& s = slots_[slot];
   if (first == 0) kept_ = s.begin;

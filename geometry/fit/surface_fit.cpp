@@ -10,6 +10,10 @@
 #include "geometry/fit/net_choice.hpp"
 #include "geometry/fit/net_solver.hpp"
 
+// Blocks of matrices whose sizes were fixed in the constructor, vectors that grow within what was reserved there: the
+// compiler cannot know.
+MOLDLOFT_GEOMETRY_CHECKED_AT_RUN_TIME
+
 namespace moldloft::geometry {
 
 namespace {

@@ -21,6 +21,7 @@
 
 #include "geometry/error.hpp"
 #include "geometry/fit/plan_map.hpp"
+#include "geometry/nonblocking.hpp"
 #include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
@@ -57,15 +58,18 @@ class SurfaceFit {
   explicit SurfaceFit(const SurfaceFitSettings&);
   ~SurfaceFit();
 
-  void begin(const PlanMap& map);  // forgets everything; the map must stay alive
+  void begin(const PlanMap& map)
+      MOLDLOFT_GEOMETRY_NONBLOCKING;  // forgets everything; the map must stay alive
   // Folds points of one shot in. `shot` counts from 0; all points of one shot must be added before another
   // shot begins. Points off the plate are counted and left out. Wholly bounded by the size of the chunk.
-  std::expected<void, Error> add(std::span<const Eigen::Vector3d> world_points, double weight, int shot);
+  std::expected<void, Error> add(std::span<const Eigen::Vector3d> world_points, double weight,
+                                 int shot) MOLDLOFT_GEOMETRY_NONBLOCKING;
 
-  void start_solving();
-  std::expected<bool, Error> step();  // one bounded piece; true when the surface is ready
-  double progress() const;            // of the solution, 0..1
-  double work() const;                // multiply-adds of the last step: at most work_a_step
+  void start_solving() MOLDLOFT_GEOMETRY_NONBLOCKING;
+  std::expected<bool, Error> step()
+      MOLDLOFT_GEOMETRY_NONBLOCKING;                      // one bounded piece; true when the surface is ready
+  double progress() const MOLDLOFT_GEOMETRY_NONBLOCKING;  // of the solution, 0..1
+  double work() const;  // multiply-adds of the last step: at most work_a_step
 
   const BSplineSurface& surface() const;
   const SurfaceFitReport& report() const;

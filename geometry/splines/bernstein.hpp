@@ -29,7 +29,7 @@ inline BernsteinValues bernstein(double t) {
 // From the Bernstein polynomials of degree k, blossomed at k arguments, to those of degree k + 1 with one
 // more argument t (thesis eq. 2.31 with an argument of its own for every step). In place; `row` has room for
 // k + 2.
-inline void raise_bernstein(double* row, int k, double t) {
+constexpr void raise_bernstein(double* row, int k, double t) {
   row[k + 1] = 0;
   for (int p = k + 1; p > 0; --p) row[p] = (1 - t) * row[p] + t * row[p - 1];
   row[0] = (1 - t) * row[0];
@@ -39,7 +39,7 @@ inline void raise_bernstein(double* row, int k, double t) {
 // a and l times b. restrict_bernstein() of bernstein_form.hpp is the same for a degree known only at run
 // time.
 template <int degree>
-std::array<std::array<double, degree + 1>, degree + 1> restriction(double a, double b) {
+constexpr std::array<std::array<double, degree + 1>, degree + 1> restriction(double a, double b) {
   std::array<std::array<double, degree + 1>, degree + 1> r{};
   for (int l = 0; l <= degree; ++l) {
     std::array<double, degree + 1> row{1};

@@ -16,6 +16,7 @@
 #include <span>
 #include <vector>
 
+#include "geometry/nonblocking.hpp"
 #include "geometry/splines/bspline_basis.hpp"
 #include "geometry/splines/knots.hpp"
 
@@ -45,7 +46,7 @@ struct BSplineCurve {
 
   double begin() const { return knots[degree]; }
   double end() const { return knots[knots.size() - degree - 1]; }
-  CurvePoint<dim> at(double t) const;
+  CurvePoint<dim> at(double t) const MOLDLOFT_GEOMETRY_NONBLOCKING;
   Point value(double t) const { return at(t).value; }
   Point de_boor(double t) const;  // the same value by the triangle of convex combinations (2.50, 2.51)
 };

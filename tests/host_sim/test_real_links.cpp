@@ -13,6 +13,7 @@
 #include "hal/run_store.hpp"
 #include "host_sim/child_process.hpp"
 #include "host_sim/ply_reader.hpp"
+#include "host_sim/real_devices.hpp"
 
 using namespace moldloft;
 using namespace moldloft::host_sim;
@@ -20,44 +21,6 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 
 namespace {
-
-constexpr auto run_limit =
-    90s;  // a run takes 18 s of cell time; the rest is for a machine that does other things too
-
-// The simulated devices, ready to be connected to.
-class Devices {
- public:
-  explicit Devices(const std::vector<std::string>& more = {}) : child_{words(folder_, more)} {
-    REQUIRE_MESSAGE(child_.prints("ready:", 20s), child_.err());
-  }
-  std::string config() const { return folder_.file("cell.toml"); }
-  // The same with one line replaced, told by its beginning.
-  std::string config_with(const std::string& begins, const std::string& line) const {
-    std::istringstream lines{text_of(config())};
-    std::ofstream changed{folder_.file("changed.toml")};
-    for (std::string old; std::getline(lines, old);)
-      changed << (old.starts_with(begins) ? line : old) << "\n";
-    return folder_.file("changed.toml");
-  }
-
- private:
-  static std::vector<std::string> words(const hal::TemporaryFolder& folder,
-                                        const std::vector<std::string>& more) {
-    std::vector<std::string> all = {
-        MOLDLOFT_SIM,         "devices", "--scanner-port",        "0", "--robot-pty",
-        folder.file("robot"), "--cell",  folder.file("cell.toml")};
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
-  }
-  hal::TemporaryFolder folder_;
-  ChildProcess child_;
-};
-
-std::vector<std::string> run_words(const Devices& devices, const std::string& out, bool resume = false) {
-  std::vector<std::string> words = {MOLDLOFT, "run", devices.config(), "--out", out};
-  if (resume) words.push_back("--resume");
-  return words;
-}
 
 json summary_in(const std::string& folder) { return json::parse(text_of(folder + "/summary.json")); }
 

@@ -1,0 +1,19 @@
+// Must not compile: a task that takes a lock.
+#include <mutex>
+
+#include "hal/realtime.hpp"
+#include "tasks/scheduler.hpp"
+
+namespace {
+
+class Locks final : public moldloft::tasks::Task {
+ public:
+  void run(moldloft::tasks::Instant) override { const std::lock_guard guard{mutex_}; }
+
+ private:
+  std::mutex mutex_;
+};
+
+[[maybe_unused]] Locks task;
+
+}  // namespace

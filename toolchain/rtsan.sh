@@ -1,0 +1,58 @@
+#!/usr/bin/env bash
+# Proves with Clang that the control thread neither allocates nor waits: the preset `rtsan` refuses to compile what might
+# (-Wfunction-effects), and a complete run of that program on real links (TCP, pseudo-terminal) must pass without a
+# word of RealtimeSanitizer. Then the rule is broken on purpose in six ways, and each must stop the program.
+#
+#     ./toolchain/rtsan.sh [options of moldloft-sim devices, such as --plate dome --seed 7]
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+toolchain/setup.sh --tests
+cmake --preset release >/dev/null
+cmake --build --preset release --target moldloft-sim pty_modem
+cmake --preset rtsan >/dev/null
+cmake --build --preset rtsan --target moldloft realtime_probe
+
+sim=$PWD/build/release/bin/moldloft-sim
+bin=$PWD/build/rtsan/bin
+scratch=$(mktemp -d)
+devices=
+cleanup() {
+  if [ -n "$devices" ]; then kill "$devices" 2>/dev/null || true; wait "$devices" 2>/dev/null || true; fi
+  rm -rf "$scratch"
+}
+trap cleanup EXIT
+
+"$sim" devices --scanner-port 0 --robot-pty "$scratch/robot" --cell "$scratch/cell.toml" --seed 1 "$@" \
+  >"$scratch/devices.log" 2>&1 &
+devices=$!
+for _ in $(seq 100); do
+  grep -q '^ready' "$scratch/devices.log" && break
+  kill -0 "$devices" 2>/dev/null || { cat "$scratch/devices.log" >&2; devices=; exit 1; }
+  sleep 0.1
+done
+
+# A sanitizer that stops at the first violation leaves no doubt: the exit code is that of a completed run, or it is not.
+# Assertions are compiled in, and the program is several times slower than what is deployed: ticks may be missed.
+run=0
+LD_PRELOAD=$PWD/build/release/lib/libpty_modem.so timeout 300 \
+  "$bin/moldloft" run "$scratch/cell.toml" --out "$scratch/run" >"$scratch/run.log" 2>&1 || run=$?
+if [ "$run" -ne 0 ] || grep -q RealtimeSanitizer "$scratch/run.log"; then
+  cat "$scratch/run.log" >&2
+  echo "rtsan: the complete run ended with exit code $run" >&2
+  exit 1
+fi
+ticks=$(sed -n 's/^  "ticks": \([0-9]*\),$/\1/p' "$scratch/run/timing.json")
+echo "rtsan: a complete run on real links, $ticks ticks, 0 violations"
+
+for how in heap new lock sleep read file; do
+  if "$bin/realtime_probe" $how >"$scratch/probe.log" 2>&1 || ! grep -q 'RealtimeSanitizer: unsafe-library-call' "$scratch/probe.log"; then
+    cat "$scratch/probe.log" >&2
+    echo "rtsan: the rule was broken ($how) and the sanitizer let it pass" >&2
+    exit 1
+  fi
+done
+for how in allowed outside suspended; do
+  "$bin/realtime_probe" $how >"$scratch/probe.log" 2>&1 || { cat "$scratch/probe.log" >&2; echo "rtsan: $how was stopped" >&2; exit 1; }
+done
+echo "rtsan: broken on purpose in 6 ways, stopped each time"
