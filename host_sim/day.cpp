@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 
@@ -72,6 +73,7 @@ class DayRun {
         if (const auto done = one_plate(); !done) return std::unexpected{done.error()};
       }
       day.rows.push_back(row_now());
+      if (options_.on_row) options_.on_row(day.rows.back());
     }
     day.flat = std::ranges::all_of(day.rows, [&](const DayRow& r) {
       const DayRow& first = day.rows.front();
@@ -183,7 +185,31 @@ std::expected<Day, SimError> run_day(const DayOptions& options) {
   return DayRun{options, *plate, *config}.run();
 }
 
-int show_day(const DayOptions& options) {
+namespace {
+
+void print_head() {
+  fmt::print("{:>6} {:>7} {:>10} {:>7} {:>8} {:>8} {:>5} {:>10} {:>10} {:>13} {:>8} {:>8} {:>10}\n", "hours",
+             "plates", "ticks", "missed", "off beat", "shots", "lost", "stored MB", "heap KiB",
+             "resident KiB", "handles", "threads", "worst mm");
+}
+
+void print_row(const DayRow& r) {
+  fmt::print(
+      "{:>6.2f} {:>7} {:>10} {:>7} {:>5} ns {:>8} {:>5} {:>10.1f} {:>10} {:>13} {:>8} {:>8} {:>10.4f}\n",
+      r.hours, r.plates, r.ticks, r.missed, r.off_beat_ns, r.shots, r.recorder_lost,
+      static_cast<double>(r.recorded_bytes) * 1e-6, r.heap_bytes / 1024, r.resident_bytes / 1024, r.handles,
+      r.threads, r.worst_normal_mm);
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int show_day(const DayOptions& asked) {
+  DayOptions options = asked;
+  if (!options.json) {
+    print_head();
+    options.on_row = print_row;
+  }
   const auto day = run_day(options);
   if (!day) {
     fmt::print(stderr, "moldloft-sim day: {}\n", day.error().what);
@@ -191,20 +217,11 @@ int show_day(const DayOptions& options) {
   }
   if (options.json) {
     fmt::print("{}\n", json_of(*day).dump(2));
-    return day->flat ? 0 : 1;
-  }
-  fmt::print("{:>6} {:>7} {:>10} {:>7} {:>8} {:>8} {:>5} {:>10} {:>10} {:>13} {:>8} {:>8} {:>10}\n", "hours",
-             "plates", "ticks", "missed", "off beat", "shots", "lost", "stored MB", "heap KiB",
-             "resident KiB", "handles", "threads", "worst mm");
-  for (const DayRow& r : day->rows)
-    fmt::print(
-        "{:>6.2f} {:>7} {:>10} {:>7} {:>5} ns {:>8} {:>5} {:>10.1f} {:>10} {:>13} {:>8} {:>8} {:>10.4f}\n",
-        r.hours, r.plates, r.ticks, r.missed, r.off_beat_ns, r.shots, r.recorder_lost,
-        static_cast<double>(r.recorded_bytes) * 1e-6, r.heap_bytes / 1024, r.resident_bytes / 1024, r.handles,
-        r.threads, r.worst_normal_mm);
-  fmt::print("{}\n", day->flat
-                         ? "flat: heap, handles and threads as after the first row, nothing lost, on the beat"
+  } else {
+    fmt::print("{}\n",
+               day->flat ? "flat: heap, handles and threads as after the first row, nothing lost, on the beat"
                          : "NOT flat");
+  }
   return day->flat ? 0 : 1;
 }
 

@@ -5,18 +5,11 @@
 // Failure      one line; a plate that does not complete ends the day
 #pragma once
 
+#include <functional>
+
 #include "host_sim/cell_description.hpp"
 
 namespace moldloft::host_sim {
-
-struct DayOptions {
-  CellDescription cell;
-  double hours = 24;  // of cell time
-  double every_s =
-      120;  // from the start of one plate to the start of the next; a plate that takes longer is followed at once
-  int rows = 24;  // of the table, at equal distances
-  bool json = false;
-};
 
 // What stood at the end of one row.
 struct DayRow {
@@ -27,6 +20,16 @@ struct DayRow {
   std::size_t resident_bytes = 0;
   int handles = 0, threads = 0;
   double worst_normal_mm = 0;  // of all plates so far, against the truth
+};
+
+struct DayOptions {
+  CellDescription cell;
+  double hours = 24;  // of cell time
+  double every_s =
+      120;  // from the start of one plate to the start of the next; a plate that takes longer is followed at once
+  int rows = 24;  // of the table, at equal distances
+  bool json = false;
+  std::function<void(const DayRow&)> on_row = {};  // as soon as it stands
 };
 
 struct Day {

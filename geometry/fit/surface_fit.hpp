@@ -53,7 +53,7 @@ class SurfaceFit {
  public:
   // What a step of the solution may cost in multiply-adds, as long as no net has more than 64 spans a side: 6 us with
   // AVX-512, 200 us on a processor of 500 million instructions a second.
-  static constexpr double work_a_step = 60'000;
+  static constexpr double work_a_step = 70'000;
 
   explicit SurfaceFit(const SurfaceFitSettings&);
   ~SurfaceFit();
