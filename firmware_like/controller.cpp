@@ -107,9 +107,9 @@ bool Controller::at_rest() const {
     case tasks::CellState::stopped:
       return true;
     case tasks::CellState::aborted:
-      return repeats || !attended_;
+      return repeats || !attended_ || dismissed_;
     case tasks::CellState::clearing:
-      return !attended_;
+      return dismissed_;
     case tasks::CellState::held:
       return repeats || (cell_.cause() == tasks::HoldCause::person && !attended_);
     default:

@@ -42,7 +42,8 @@ class Controller {
   void start();  // commands the cell to start, or to start held; the first tick is due now
   bool tick();   // one tick; false when the cell has come to rest
   bool at_rest() const;
-  void dismiss_operator() noexcept { attended_ = false; }  // from anywhere: nobody will come any more
+  // From anywhere: nobody will come to clear what has aborted. (A cell that is held can be commanded to stop.)
+  void dismiss_operator() noexcept { dismissed_ = true; }
 
   const CellConfig& config() const { return config_; }
   tasks::Cell& cell() { return cell_; }
@@ -71,8 +72,8 @@ class Controller {
 
   CellConfig config_;
   hal::Clock& clock_;
-  const bool begin_held_;
-  std::atomic<bool> attended_;
+  const bool begin_held_, attended_;
+  std::atomic<bool> dismissed_{false};
   hal::FlightRecorder flight_;
   hal::Recorder recorder_;
   hal::TappedLink scanner_link_, robot_link_;

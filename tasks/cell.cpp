@@ -20,6 +20,12 @@ CellEvent most_urgent(unsigned commands) {
   return static_cast<CellEvent>(std::countr_zero(commands));
 }
 
+// Stopped or aborted, or on the way to it.
+bool is_ending(CellState state) {
+  return state == CellState::stopping || state == CellState::stopped || state == CellState::aborting ||
+         state == CellState::aborted || state == CellState::clearing;
+}
+
 }  // namespace
 
 Cell::Cell(const CellSettings& settings, Clock& clock, hal::Scanner& scanner, hal::Robot& robot,
@@ -163,9 +169,9 @@ void Cell::on_robot(const hal::RobotEvent& event) {
       break;
     case Kind::refused:
       record("robot", "refused", "", "", event.text);
-      // The motion that a stop has ended answers with a refusal too: nothing may be sent after it.
-      if (state_ == CellState::stopping || state_ == CellState::aborting) break;
-      if (state_ == CellState::starting) {
+      // The motion that a stop has ended answers with a refusal too, and may do so late: nothing may be sent after it.
+      if (is_ending(state_)) break;
+      if (state_ != CellState::execute && state_ != CellState::holding) {
         abort(event.text);
       } else if (!arm_.turned_half) {
         // The same stripes can be had with the head turned by half a turn, which puts the arm elsewhere.

@@ -60,7 +60,7 @@ TEST_CASE("no progress line is longer than a terminal is wide when it does not h
 }
 
 TEST_CASE("the status line holds still while nothing happens, and says what a person has to see to") {
-  tasks::CellProgress p{.state = tasks::CellState::execute, .phase = tasks::Phase::scan_surface};
+  tasks::CellProgress p{.state = tasks::CellState::execute, .phase = tasks::Phase::scan_surface, .why = {}};
   p.boundary_shots = 14;
   p.surface_shots = 3;
   p.surface_planned = 16;

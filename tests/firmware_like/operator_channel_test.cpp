@@ -46,7 +46,7 @@ TEST_CASE("a command is answered with the state before and after it") {
   Bench bench;
   CHECK(bench.controller->cell().state() == CellState::held);
   CHECK(bench.tell("unhold") == "done: Held -> Starting");
-  CHECK(bench.tell("abort") == "done: Starting -> Aborting");
+  CHECK(bench.tell("abort") == "done: Starting -> Aborted");
   bench.controller->tick();
   CHECK(bench.tell("clear") == "done: Aborted -> Clearing");
   CHECK(bench.looks == 3);  // each in the next tick

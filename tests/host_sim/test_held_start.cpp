@@ -127,7 +127,8 @@ TEST_CASE(
   CHECK(cell.went_through("Unholding"));
 }
 
-TEST_CASE("when nobody will come any more, a cell that waits for a person has come to rest") {
+TEST_CASE(
+    "a stop ends a cell that waits for a person, and nobody can be awaited longer by one that has aborted") {
   for (const bool abort : {false, true}) {
     ScriptedRun cell;
     cell.options.held = true;
@@ -135,10 +136,14 @@ TEST_CASE("when nobody will come any more, a cell that waits for a person has co
     hal::Instant ended{0};
     const auto run = cell.run([&](const SimulatedCell& c, hal::Instant now) {
       if (abort && now > 1s) c.controller.cell().command(CellEvent::abort);
-      if (now > 10s) c.controller.dismiss_operator();
+      if (now > 10s) {
+        c.controller.cell().command(CellEvent::stop);
+        c.controller.dismiss_operator();
+      }
       ended = now;
     });
-    CHECK(run.exit_code == (abort ? firmware_like::exit_aborted : firmware_like::exit_held));
+    CHECK(run.exit_code == (abort ? firmware_like::exit_aborted : firmware_like::exit_stopped));
+    CHECK(ended > 10s);
     CHECK(ended < 11s);
   }
 }

@@ -158,7 +158,7 @@ TEST_CASE("a program that is killed and started again with --resume-held moves n
   CHECK(json::parse(tell("status").out)["why"] ==
         "started held: nothing moves before an operator sends unhold");
   CHECK(tell("hold").err == "moldloft: refused: hold means nothing in Held\n");
-  CHECK(tell("stop").out == "done: Held -> Stopping\n");
+  CHECK(tell("stop").out == "done: Held -> Stopped\n");
   CHECK(run.wait(20s) == firmware_like::exit_stopped);
   CHECK(robot_bytes_sent(out) == sent_before);  // to the last byte: the robot has heard nothing
   CHECK_FALSE(std::filesystem::exists(control));
