@@ -1,12 +1,15 @@
 #!/usr/bin/env bash
-# Unpacks the arm64 libraries that the controller links into build/aarch64-sysroot, out of the distribution's own packages.
+# Unpacks what the controller includes and links, for arm64, into build/aarch64-sysroot, out of the distribution's own packages.
 # No root, and nothing of this machine is changed: apt works on a state of its own beside it. build.sh calls this.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 sysroot=$PWD/build/aarch64-sysroot
 [ -f "$sysroot/.complete" ] && exit 0
-packages=(libc6-dev libstdc++6 libfmt-dev libserialport-dev libsqlite3-dev libtomlplusplus-dev libsystemd-dev)
+packages=(
+  libc6-dev libstdc++6 libfmt-dev libserialport-dev libsqlite3-dev libtomlplusplus-dev libsystemd-dev
+  libeigen3-dev libasio-dev libcli11-dev nlohmann-json3-dev doctest-dev  # headers alone: a sysroot hides this machine's
+)
 
 apt=$sysroot.apt
 rm -rf "$sysroot" "$apt"

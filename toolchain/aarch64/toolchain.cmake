@@ -10,8 +10,6 @@ set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)
 set(CMAKE_CXX_COMPILER aarch64-linux-gnu-g++)
 set(CMAKE_LIBRARY_ARCHITECTURE aarch64-linux-gnu)
 
-# Headers without machine code (Eigen, CLI11, doctest, Asio, nlohmann-json) serve both and are this machine's; libraries
-# must be arm64's.
 set(moldloft_sysroot ${CMAKE_CURRENT_LIST_DIR}/../../build/aarch64-sysroot)
 get_filename_component(moldloft_sysroot ${moldloft_sysroot} ABSOLUTE)
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
