@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "firmware_like/control_thread.hpp"
+#include "firmware_like/flight_files.hpp"
 #include "firmware_like/latency_load.hpp"
 #include "firmware_like/recorder_thread.hpp"
 #include "firmware_like/results.hpp"
@@ -137,11 +138,12 @@ void add(std::optional<CyclictestResult>& all, const CyclictestResult& turn) {
 std::expected<Measured, RunError> measure(LatencyLoad& load, RunFolder& folder, const CellConfig& config,
                                           const TurnPlan& plan, bool compare) {
   Measured m{.conditions = {config.realtime, read_environment(config.realtime.cpu), {}}, .cyclictest = {}};
+  FlightFiles flight{load.flight(), folder.path};
   const ProcessSetup process{config.realtime};
   Turns turns{load, config.realtime, plan.ticks};
   for (int turn = 0; turn < plan.turns && !interrupted; ++turn) {
     {
-      const RecorderThread recorder{load.recorder(), *folder.store};
+      const RecorderThread recorder{load.recorder(), *folder.store, flight};
       if (turn == 0) {
         m.conditions.setup = process.rows();
         std::ranges::copy(turns.control().setup(), std::back_inserter(m.conditions.setup));

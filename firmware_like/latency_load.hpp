@@ -49,6 +49,7 @@ class LatencyLoad {
 
   tasks::Scheduler& scheduler() { return scheduler_; }
   const tasks::Scheduler& scheduler() const { return scheduler_; }
+  hal::FlightRecorder& flight() { return flight_; }
   hal::Recorder& recorder() { return recorder_; }
   const hal::Recorder& recorder() const { return recorder_; }
   const tasks::SurfaceTask& surface() const { return surface_; }

@@ -21,22 +21,24 @@ struct Bar {
 };
 
 // From a bit below the smallest value to a bit above the largest; in whole microseconds where asked for.
-std::vector<Bar> bars_for(const std::vector<LogSeries>& series, bool whole_us) {
+std::vector<Bar> bars_for(const LogPlot& plot) {
   double lowest = INFINITY, highest = 0;
-  for (const auto& s : series) {
+  for (const auto& s : plot.series) {
     if (s.values.empty()) continue;
     lowest = std::min(lowest, static_cast<double>(s.values.min().count()));
     highest = std::max(highest, static_cast<double>(s.values.max().count()));
   }
   if (!(lowest <= highest)) return {};
-  const double unit = whole_us ? 1000 : 1;
+  const double unit = plot.whole_us ? 1000 : 1;
+  const double smallest = std::max(static_cast<double>(plot.smallest.count()), unit);
   const auto edge = [&](int i) { return std::floor(std::exp2(i / bars_an_octave) / unit + 0.5) * unit; };
-  int i = static_cast<int>(std::floor(std::log2(std::max(lowest, unit)) * bars_an_octave)) - 1;
+  int i = static_cast<int>(std::floor(std::log2(std::max(lowest, smallest)) * bars_an_octave));
+  if (lowest > smallest) --i;
   std::vector<Bar> bars;
-  for (double from = lowest < unit ? unit / 2 : edge(i); from <= highest; ++i) {
+  for (double from = edge(i); bars.empty() || from <= highest; ++i) {
     const double to = edge(i + 1);
     if (to <= from) continue;
-    bars.push_back({from, to, std::vector<std::uint64_t>(series.size())});
+    bars.push_back({from, to, std::vector<std::uint64_t>(plot.series.size())});
     from = to;
   }
   return bars;
@@ -80,7 +82,7 @@ std::string grid(const Axes& axes) {
     for (int digit = 1; digit < 10; ++digit) {
       const double ns = digit * std::pow(10.0, decade), x = axes.x(ns);
       if (x < left_px - 0.5 || x > width_px - right_px + 0.5) continue;
-      const bool labelled = digit == 1 || ((digit == 2 || digit == 5) && axes.to - axes.from < 3);
+      const bool labelled = digit == 1 || ((digit == 2 || digit == 5) && axes.to - axes.from < 3.5);
       svg += fmt::format(R"(<line class="{}" x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}"/>)",
                          digit == 1 ? "grid" : "fine", x, top_px, x, bottom);
       if (labelled)
@@ -137,9 +139,9 @@ std::string time_text(hal::Duration d) {
   return text(ns / 1e9, "s");
 }
 
-std::string log_plot(const std::vector<LogSeries>& series, bool whole_us, std::string_view label) {
-  auto bars = bars_for(series, whole_us);
-  for (std::size_t s = 0; s < series.size(); ++s) count_into(bars, s, series[s].values);
+std::string log_plot(const LogPlot& plot) {
+  auto bars = bars_for(plot);
+  for (std::size_t s = 0; s < plot.series.size(); ++s) count_into(bars, s, plot.series[s].values);
   double most = 1;
   for (const auto& bar : bars)
     for (const auto count : bar.counts) most = std::max(most, static_cast<double>(count));
@@ -149,16 +151,16 @@ std::string log_plot(const std::vector<LogSeries>& series, bool whole_us, std::s
     axes.to = std::max(std::log10(bars.back().to_ns) + 0.02, axes.from + 1);
   }
   std::string svg =
-      fmt::format(R"(<svg viewBox="0 0 {} {}" role="img" aria-label="{}">)", width_px, height_px, label);
+      fmt::format(R"(<svg viewBox="0 0 {} {}" role="img" aria-label="{}">)", width_px, height_px, plot.label);
   svg += grid(axes);
-  for (std::size_t s = 0; s < series.size() && !bars.empty(); ++s) svg += outline(bars, s, axes);
-  if (series.size() > 1) svg += legend(series);
+  for (std::size_t s = 0; s < plot.series.size() && !bars.empty(); ++s) svg += outline(bars, s, axes);
+  if (plot.series.size() > 1) svg += legend(plot.series);
   svg += fmt::format(R"(<text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>)",
-                     (left_px + width_px - right_px) / 2, height_px - 8, label);
+                     (left_px + width_px - right_px) / 2, height_px - 8, plot.label);
   svg += fmt::format(
-      R"svg(<text class="tick" x="14" y="{:.1f}" text-anchor="middle" transform="rotate(-90 14 {:.1f})">how often</text>)svg",
-      height_px / 2, height_px / 2);
-  return svg + "</svg>\n";
+      R"svg(<text class="tick" x="14" y="{0:.1f}" text-anchor="middle" transform="rotate(-90 14 {0:.1f})">)svg",
+      height_px / 2);
+  return svg + "how often</text></svg>\n";
 }
 
 }  // namespace moldloft::firmware_like

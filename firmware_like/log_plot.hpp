@@ -22,8 +22,13 @@ struct LogSeries {
   tasks::Histogram values;
 };
 
-// `whole_us`: bars begin and end at whole microseconds, for series that know nothing finer.
-std::string log_plot(const std::vector<LogSeries>&, bool whole_us, std::string_view label);
+struct LogPlot {
+  std::vector<LogSeries> series;
+  std::string label;            // of the axis of time
+  hal::Duration smallest{100};  // what is smaller stands in the first bar
+  bool whole_us = false;  // bars begin and end at whole microseconds: for series that know nothing finer
+};
+std::string log_plot(const LogPlot&);
 
 std::string time_text(hal::Duration);  // "870 ns", "23 us", "1.98 ms"
 

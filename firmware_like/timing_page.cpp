@@ -10,6 +10,8 @@
 namespace moldloft::firmware_like {
 namespace {
 
+using namespace std::chrono_literals;
+
 constexpr std::string_view style = R"(
 :root{color-scheme:light dark;--paper:#fff;--ink:#1c2430;--soft:#5b6675;--line:#d8dde4;--fine:#eef1f4;
 --ours:#1f6fb2;--theirs:#c2571a;--good:#1d7a46;--bad:#b3261e;--panel:#f6f8fa}
@@ -27,7 +29,7 @@ h1{font-size:24px;margin:0 0 4px}h2{font-size:17px;margin:34px 0 6px}p{margin:4p
 .tile b{display:block;font-size:21px;font-variant-numeric:tabular-nums;white-space:nowrap}
 .wide{overflow-x:auto}table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums;font-size:14px}
 th,td{padding:3px 8px;border-bottom:1px solid var(--line);text-align:right;white-space:nowrap}
-th{color:var(--soft);font-weight:600}th:first-child,td:first-child,.words td,.words th,td.word{text-align:left}
+th{color:var(--soft);font-weight:600}th:first-child,td:first-child,.words td,.words th,th.word,td.word{text-align:left}
 .words td{white-space:normal;vertical-align:top}.words td:first-child{white-space:nowrap}
 .bad{color:var(--bad);font-weight:600}.good{color:var(--good)}
 svg{width:100%;height:auto;display:block}.grid{stroke:var(--line)}.fine{stroke:var(--fine)}
@@ -146,9 +148,11 @@ std::string histogram_row(std::string_view name, const Json& h) {
 std::string wake_up(const Json& t) {
   if (t.contains("compared")) {
     const Json& c = t.at("compared");
-    std::string body = log_plot({{"ours, with fit and recorder busy", histogram_from(c.at("ours"))},
-                                 {"cyclictest, alone", histogram_from(c.at("cyclictest"))}},
-                                true, "wake-up latency");
+    std::string body =
+        log_plot({.series = {{"ours, with fit and recorder busy", histogram_from(c.at("ours"))},
+                             {"cyclictest, alone", histogram_from(c.at("cyclictest"))}},
+                  .label = "wake-up latency",
+                  .whole_us = true});
     std::vector<Cell> ratio = {{"ratio"}, {""}, {""}};
     for (const auto& p : percentiles) {
       const std::string key = p.key;
@@ -165,15 +169,19 @@ std::string wake_up(const Json& t) {
         body);
   }
   if (!measured(t, "wake_up")) return "";
-  return section("How late a tick begins",
-                 "From the time at which a tick is due to the moment at which the control thread runs.",
-                 log_plot({{"ours", histogram_from(t.at("wake_up"))}}, false, "wake-up latency"));
+  return section(
+      "How late a tick begins",
+      "From the time at which a tick is due to the moment at which the control thread runs.",
+      log_plot({.series = {{"ours", histogram_from(t.at("wake_up"))}}, .label = "wake-up latency"}));
 }
 
 std::string plot_of(const Json& t, const char* key, std::string_view title, std::string_view lead,
-                    std::string_view label) {
+                    std::string_view label, hal::Duration smallest) {
   if (!measured(t, key)) return "";
-  return section(title, lead, log_plot({{"", histogram_from(t.at(key))}}, false, label));
+  return section(
+      title, lead,
+      log_plot(
+          {.series = {{"", histogram_from(t.at(key))}}, .label = std::string{label}, .smallest = smallest}));
 }
 
 std::string distributions(const Json& t) {
@@ -322,13 +330,14 @@ std::string timing_page(const Json& t, std::string_view title) {
       escaped(title), style);
   html += head(t, title) + wake_up(t);
   html += plot_of(t, "execution", "What the table takes", "All tasks of a tick together.",
-                  "execution of the table");
-  html += plot_of(t, "slack", "What is left of a tick", "Background work runs in it, up to the guard time.",
-                  "slack");
+                  "execution of the table", 100ns);
+  html += plot_of(t, "slack", "What is left of a tick",
+                  "Background work runs in it, up to the guard time. The first bar holds everything below.",
+                  "slack", 10us);
   html +=
       plot_of(t, "frame_to_command", "From frame to command",
               "From the last byte of a frame read to the command that it decided handed to the robot's link.",
-              "frame to command");
+              "frame to command", 100ns);
   html += distributions(t) + misses(t) + tasks_section(t) + budgets(t) + machine(t);
   return html + "</main>\n</body>\n</html>\n";
 }

@@ -8,6 +8,7 @@ namespace moldloft::firmware_like {
 namespace {
 
 constexpr int name_width = 20;
+constexpr int result_width = 28;  // as the table of a run's result has it
 
 // A figure with as many places as a person reads: 7.25, 72.5, 725, 7250.
 std::string figure(const Json& value) {
@@ -57,15 +58,14 @@ std::string histograms(const Json& t) {
 }
 
 std::string missed(const Json& t) {
-  std::string s = fmt::format("missed ticks        {} of {}", number(t, "missed_ticks"), number(t, "ticks"));
-  if (t.contains("missed_by_cause") && number(t, "missed_ticks") > 0) {
-    std::string_view before = ":";
-    for (const auto& [cause, count] : t.at("missed_by_cause").items()) {
-      s += fmt::format("{} {} {}", before, cause, count.get<std::uint64_t>());
-      before = ",";
-    }
+  std::string s = fmt::format("{} of {}", number(t, "missed_ticks"), number(t, "ticks"));
+  if (!t.contains("missed_by_cause") || number(t, "missed_ticks") == 0) return s;
+  std::string_view before = ":";
+  for (const auto& [cause, count] : t.at("missed_by_cause").items()) {
+    s += fmt::format("{} {} {}", before, cause, count.get<std::uint64_t>());
+    before = ",";
   }
-  return s + "\n";
+  return s;
 }
 
 std::string first_misses(const Json& t) {
@@ -80,10 +80,10 @@ std::string first_misses(const Json& t) {
 }
 
 std::string load(const Json& t) {
-  if (!t.contains("load") || !t.at("load").is_object()) return "";
+  if (!t.contains("load") || !t.at("load").is_object()) return "not measured";
   const auto percent = [&](const char* key) { return 100 * t.at("load").at(key).get<double>(); };
-  return fmt::format("load                table {:.1f} %, background {:.1f} %, idle {:.1f} %\n",
-                     percent("table"), percent("background"), percent("idle"));
+  return fmt::format("table {:.1f} %, background {:.1f} %, idle {:.1f} %", percent("table"),
+                     percent("background"), percent("idle"));
 }
 
 std::string task_counts(const Json& t) {
@@ -125,7 +125,11 @@ std::string budgets(const Json& t) {
 
 std::string verdict(const Json& t) {
   const bool yes = t.contains("representative") && t.at("representative").get<bool>();
-  return "representative      " + (yes ? std::string{"yes"} : "NO: " + text(t, "why")) + "\n";
+  return yes ? std::string{"yes"} : "NO: " + text(t, "why");
+}
+
+std::string line(std::string_view name, int width, const std::string& value) {
+  return fmt::format("{:<{}}{}\n", name, width, value);
 }
 
 std::string comparison(const Json& t) {
@@ -143,18 +147,20 @@ std::string comparison(const Json& t) {
 }  // namespace
 
 std::string timing_table(const Json& t) {
-  return comparison(t) + histograms(t) + "\n" + missed(t) + first_misses(t) + load(t) + "\n" +
-         task_counts(t) + "\n" + budgets(t) + "\n" + verdict(t);
+  return comparison(t) + histograms(t) + "\n" + line("missed ticks", name_width, missed(t)) +
+         first_misses(t) + line("load", name_width, load(t)) + "\n" + task_counts(t) + "\n" + budgets(t) +
+         "\n" + line("representative", name_width, verdict(t));
 }
 
 std::string timing_lines(const Json& t) {
-  const auto& w = t.at("wake_up");
+  const Json& w = t.at("wake_up");
   std::string s;
-  if (w.is_object() && number(w, "count") > 0)
-    s += fmt::format("{:<{}}p50 {}, p99 {}, p99.9 {}, max {} us\n", "wake-up latency", name_width,
-                     figure(w.at("p50_us")), figure(w.at("p99_us")), figure(w.at("p999_us")),
-                     figure(w.at("max_us")));
-  return s + missed(t) + load(t) + verdict(t);
+  if (number(w, "count") > 0)
+    s += line("wake-up latency, us", result_width,
+              fmt::format("p50 {}, p99 {}, p99.9 {}, max {}", figure(w.at("p50_us")), figure(w.at("p99_us")),
+                          figure(w.at("p999_us")), figure(w.at("max_us"))));
+  return s + line("missed ticks", result_width, missed(t)) + line("load", result_width, load(t)) +
+         line("timing representative", result_width, verdict(t));
 }
 
 }  // namespace moldloft::firmware_like

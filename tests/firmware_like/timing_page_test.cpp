@@ -144,7 +144,7 @@ TEST_CASE("one value among a hundred thousand stands clear of the axis, in its p
   tasks::Histogram h;
   for (int i = 0; i < 100'000; ++i) h.add(10us);
   h.add(10ms);
-  const std::string svg = log_plot({{"ours", h}}, false, "latency");
+  const std::string svg = log_plot({.series = {{"ours", h}}, .label = "latency"});
   CHECK(flaw_of("<!DOCTYPE html>" + svg) == "");
   std::smatch path;
   REQUIRE(
@@ -167,6 +167,19 @@ TEST_CASE("one value among a hundred thousand stands clear of the axis, in its p
   // Three decades lie between the two; both stand within the axes.
   CHECK(right_of_last <= 902);
   CHECK(right_of_last > 850);
+}
+
+TEST_CASE("what is smaller than the plot begins with stands in its first bar") {
+  tasks::Histogram h;
+  for (int i = 0; i < 50; ++i) h.add(0ns);
+  h.add(900us);
+  const auto left_edge = [&](hal::Duration smallest) {
+    const std::string svg = log_plot({.series = {{"", h}}, .label = "slack", .smallest = smallest});
+    CHECK(svg.find(">1 ns<") == std::string::npos);
+    return svg.find(">10 us<") != std::string::npos && svg.find(">1 us<") == std::string::npos;
+  };
+  CHECK(left_edge(10us));
+  CHECK_FALSE(left_edge(100ns));
 }
 
 TEST_CASE("durations are written as people say them") {
