@@ -213,7 +213,7 @@ TEST_CASE("a schedule started again after a pause begins anew, and its first tic
   ScriptedClock clock;
   Scheduler scheduler{clock, {.tick = 1ms, .warm_up_ticks = 2, .starvation_ticks = 3}};
   ScriptedTask task{clock, std::vector<Duration>(20, 950us)};  // leaves no room for a background step
-  ScriptedBackground fit{clock, 100, 50us};
+  ScriptedBackground fit{clock, 100, 60us};
   scheduler.add({.name = "task", .budget = 960us}, task);
   scheduler.add_background({.name = "fit", .quantum = 60us}, fit);
 
