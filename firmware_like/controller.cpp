@@ -21,22 +21,6 @@ tasks::CellSettings settings_for(const CellConfig& config, const ControllerOptio
   return s;
 }
 
-// A frame of float32 points with intensity and its tables.
-std::size_t largest_frame(const CellConfig& c) {
-  const auto points = static_cast<std::size_t>(c.scanner.max_stripes) *
-                      static_cast<std::size_t>(c.scanner.max_points_per_stripe);
-  const std::size_t bytes_a_point = c.scanner.encoding == hal::psc1::Encoding::int16 ? 7 : 13;
-  return points * bytes_a_point + static_cast<std::size_t>(c.scanner.max_stripes) * 16 + 4096;
-}
-
-hal::Recorder::Sizes recorder_sizes(const CellConfig& c) {
-  hal::Recorder::Sizes sizes;
-  sizes.largest_frame_bytes = largest_frame(c);
-  // Four frames: a disk may stand still for three shots before the cell has to wait for it.
-  sizes.bulk_bytes = 4 * (sizes.largest_frame_bytes + sizes.largest_frame_bytes / 16);
-  return sizes;
-}
-
 }  // namespace
 
 Controller::Controller(const CellConfig& config, hal::Clock& clock, hal::ByteLink& scanner_link,

@@ -4,9 +4,11 @@
 #include <CLI/CLI.hpp>
 
 #include "firmware_like/export_command.hpp"
+#include "firmware_like/latency_command.hpp"
 #include "firmware_like/machines.hpp"
 #include "firmware_like/operator_channel.hpp"
 #include "firmware_like/replay_command.hpp"
+#include "firmware_like/report_command.hpp"
 #include "firmware_like/run_command.hpp"
 
 using namespace moldloft::firmware_like;
@@ -55,6 +57,24 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 1'000'000));
   replay_command->add_flag("--all", replay.all_ticks, "all ticks that a dump holds");
 
+  LatencyOptions latency;
+  auto* latency_command = app.add_subcommand("latency", "timing self-test with fit and recorder busy");
+  latency_command->add_option("--duration", latency.duration_s, "of the whole measurement, s")
+      ->capture_default_str();
+  latency_command->add_option("--compare", latency.compare, "cyclictest: run it in turns with ours");
+  latency_command->add_flag("--json", latency.json, "print the figures as JSON, and nothing else");
+  latency_command->add_option("--out", latency.out,
+                              "folder for the run store and the report; default: none is kept");
+  latency_command->add_option("--tick", latency.tick_us,
+                              "of the scheduler, us; default: the configuration's");
+  latency_command->add_option("--config", latency.config,
+                              "a cell's configuration (TOML), for [realtime] and scanner");
+
+  ReportOptions report;
+  auto* report_command =
+      app.add_subcommand("report", "result and timing of a stored run, and its report.html made anew");
+  report_command->add_option("run", report.run, "the run's folder")->required();
+
   auto* machines_command = app.add_subcommand("machines", "print the state machines as Mermaid diagrams");
 
   try {
@@ -67,6 +87,8 @@ int main(int argc, char** argv) {
   if (*fit_command) return fit_run(fit);
   if (*export_command) return export_run(to_cad);
   if (*replay_command) return replay_run(replay);
+  if (*latency_command) return measure_latency(latency);
+  if (*report_command) return report_run(report);
   if (*machines_command) {
     fmt::print("{}", machine_diagrams());
     return exit_done;

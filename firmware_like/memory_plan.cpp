@@ -33,6 +33,14 @@ int finest_spans(double length_mm, double span_mm) {
   return static_cast<int>(std::clamp(std::bit_floor(wanted), 8u, 256u));
 }
 
+// A frame of float32 points with intensity and its tables.
+std::size_t largest_frame(const CellConfig& c) {
+  const auto points = static_cast<std::size_t>(c.scanner.max_stripes) *
+                      static_cast<std::size_t>(c.scanner.max_points_per_stripe);
+  const std::size_t bytes_a_point = c.scanner.encoding == hal::psc1::Encoding::int16 ? 7 : 13;
+  return points * bytes_a_point + static_cast<std::size_t>(c.scanner.max_stripes) * 16 + 4096;
+}
+
 }  // namespace
 
 std::size_t total_plan(const MemoryPlan& plan) {
@@ -83,6 +91,14 @@ tasks::CellSettings cell_settings(const CellConfig& c) {
   s.view.boundary.field_half_x_mm = half_x;
   s.view.boundary.field_half_y_mm = half_y;
   return s;
+}
+
+hal::Recorder::Sizes recorder_sizes(const CellConfig& c) {
+  hal::Recorder::Sizes sizes;
+  sizes.largest_frame_bytes = largest_frame(c);
+  // Four frames: a disk may stand still for three shots before the cell has to wait for it.
+  sizes.bulk_bytes = 4 * (sizes.largest_frame_bytes + sizes.largest_frame_bytes / 16);
+  return sizes;
 }
 
 tasks::SurfaceTaskSettings surface_settings(const CellConfig& c) {

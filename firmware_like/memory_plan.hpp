@@ -25,4 +25,7 @@ std::size_t total_high_water(const MemoryPlan&);
 tasks::CellSettings cell_settings(const CellConfig&);
 tasks::SurfaceTaskSettings surface_settings(const CellConfig&);
 
+// Of the rings between control thread and disk.
+hal::Recorder::Sizes recorder_sizes(const CellConfig&);
+
 }  // namespace moldloft::firmware_like

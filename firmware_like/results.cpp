@@ -9,6 +9,8 @@
 #include "firmware_like/cad_files.hpp"
 #include "firmware_like/measured_points.hpp"
 #include "firmware_like/ply_writer.hpp"
+#include "firmware_like/timing_page.hpp"
+#include "firmware_like/timing_report.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -19,7 +21,6 @@ constexpr std::size_t points_in_ply = 200'000;
 constexpr double gate_sigmas = 10;
 
 double seconds(hal::Duration d) { return std::chrono::duration<double>(d).count(); }
-double micros(hal::Duration d) { return std::chrono::duration<double, std::micro>(d).count(); }
 
 // Rounded to a nanometre: what lies below is the arithmetic's, and makes files hard to read.
 double rounded(double mm) { return std::round(mm * 1e6) / 1e6; }
@@ -35,19 +36,6 @@ std::string result_word(const Controller& c) {
     default:
       return "stopped";
   }
-}
-
-Json histogram_json(const tasks::Histogram& h) {
-  return {{"count", h.count()},
-          {"min_us", micros(h.min())},
-          {"avg_us", micros(h.mean())},
-          {"stddev_us", micros(h.standard_deviation())},
-          {"p50_us", micros(h.percentile(0.5))},
-          {"p99_us", micros(h.percentile(0.99))},
-          {"p999_us", micros(h.percentile(0.999))},
-          {"p9999_us", micros(h.percentile(0.9999))},
-          {"max_us", micros(h.max())},
-          {"overflows", h.overflows()}};
 }
 
 }  // namespace
@@ -100,62 +88,6 @@ Json summary_of(const Controller& c, const RunLabel& label) {
     parts[item.subsystem] = {{"plan_bytes", item.plan_bytes}, {"high_water_bytes", item.high_water_bytes}};
   j["memory"]["subsystems"] = parts;
   j["recorder_lost"] = c.recorder().lost();
-  return j;
-}
-
-Json timing_of(const Controller& c, const RunConditions* conditions) {
-  const auto& s = c.scheduler();
-  Json j;
-  j["schema"] = 1;
-  put_conditions(j, conditions);
-  j["tick_us"] = micros(s.settings().tick);
-  j["ticks"] = s.ticks();
-  j["missed_ticks"] = s.missed_ticks();
-  j["missed_by_cause"] = Json::object();
-  for (const auto cause :
-       {tasks::MissCause::woken_late, tasks::MissCause::preempted, tasks::MissCause::computing})
-    j["missed_by_cause"][std::string{tasks::to_string(cause)}] = s.missed_by(cause);
-  j["first_misses"] = Json::array();
-  for (const auto& m : s.first_misses())
-    j["first_misses"].push_back({{"tick", m.tick},
-                                 {"t_ms", std::chrono::duration<double, std::milli>(m.at).count()},
-                                 {"lost", m.lost},
-                                 {"cause", std::string{tasks::to_string(m.cause)}},
-                                 {"task", std::string{s.name_of(m.task)}},
-                                 {"late_us", micros(m.late)},
-                                 {"tick_took_us", micros(m.wall)},
-                                 {"of_that_on_the_processor_us", micros(m.spent)}});
-  j["wake_up"] = histogram_json(s.wake_up());
-  j["execution"] = histogram_json(s.execution());
-  j["slack"] = histogram_json(s.slack());
-  j["pushed_by_background"] = histogram_json(s.pushed());
-  j["frame_to_command"] = histogram_json(c.cell().frame_to_command());
-  j["data_age"] = histogram_json(c.cell().data_age());
-  if (const auto drift = c.cell().scanner_clock().estimate())
-    j["scanner_clock"] = {{"drift_ppm", drift->ppm},
-                          {"sigma_ppm", drift->sigma_ppm},
-                          {"scatter_us", drift->scatter_us},
-                          {"readings", drift->pairs}};
-  for (const auto& t : s.tasks()) {
-    j["tasks"].push_back({{"name", std::string{t.spec.name}},
-                          {"period_ticks", t.spec.period_ticks},
-                          {"budget_us", micros(t.spec.budget)},
-                          {"runs", t.runs},
-                          {"slips", t.slips},
-                          {"late_starts", t.late_starts},
-                          {"lateness_us", micros(t.lateness)},
-                          {"overruns", t.overruns},
-                          {"cost", histogram_json(t.cost)}});
-  }
-  for (const auto& t : s.background()) {
-    j["background"].push_back({{"name", std::string{t.spec.name}},
-                               {"quantum_us", micros(t.spec.quantum)},
-                               {"runs", t.runs},
-                               {"refused", t.refused},
-                               {"forced", t.forced},
-                               {"overruns", t.overruns},
-                               {"cost", histogram_json(t.cost)}});
-  }
   return j;
 }
 
@@ -249,7 +181,9 @@ std::expected<void, RunError> write_results(const Controller& c, const RunFolder
   if (!events) return std::unexpected{RunError{events.error().what}};
   write("events.jsonl", events_jsonl(*events));
   write("overview.svg", picture(c, label, summary, std::move(fields)));
-  write("timing.json", timing_of(c, label.conditions).dump(2) + "\n");
+  const Json timing = timing_of(c, label.conditions);
+  write("timing.json", timing.dump(2) + "\n");
+  write("report.html", timing_page(timing, page_title(folder.path)));
   write("summary.json", summary.dump(2) + "\n");
   return result;
 }

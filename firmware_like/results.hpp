@@ -1,6 +1,6 @@
 // What a run leaves in its folder besides run.db: summary.json, boundary.ply, points.ply, surface.json,
-// surface.step, surface.igs, timing.json, events.jsonl and overview.svg. Written after the cell has come to
-// rest; every file states its unit.
+// surface.step, surface.igs, timing.json, report.html, events.jsonl and overview.svg. Written after the cell has
+// come to rest; every file states its unit.
 //
 // summary.json, surface.* and events.jsonl depend on the run alone, never on the machine: a simulated run
 // with the same seed gives the same bytes. What was measured in wall-clock time stands in timing.json.
@@ -31,7 +31,6 @@ struct RunLabel {
 };
 
 Json summary_of(const Controller&, const RunLabel&);
-Json timing_of(const Controller&, const RunConditions* = nullptr);
 
 // Everything that can be written for the state that the run is in: a run that did not complete has no
 // surface. `error_field`, when given, is what the picture's second panel shows instead of the fit's

@@ -16,6 +16,8 @@
 #include "firmware_like/operator_channel.hpp"
 #include "firmware_like/recorder_thread.hpp"
 #include "firmware_like/service_thread.hpp"
+#include "firmware_like/timing_report.hpp"
+#include "firmware_like/timing_table.hpp"
 #include "hal/cable.hpp"
 #include "hal/serial_link.hpp"
 #include "hal/tcp_link.hpp"
@@ -236,7 +238,7 @@ int run_cell(const RunOptions& options) {
   if (const auto written = write_results(*controller, *folder, label, summary); !written)
     return complain(written.error().what);
   if (code != exit_done) return complain(how_it_ended(*controller, options, out.string())), code;
-  fmt::print("{}", result_table(summary, out.string()));
+  fmt::print("{}{}", result_table(summary, out.string()), timing_lines(timing_of(*controller, &conditions)));
   return controller->recorder().store_failed() ? exit_failed : exit_done;
 }
 

@@ -37,7 +37,8 @@ void Scheduler::start() {
   next_tick_ = clock_.now();
   spent_before_ = clock_.thread_time();
   number_ = 0;
-  last_run_tick_.fill(0);
+  started_after_ = ticks_;
+  last_run_tick_.fill(ticks_);
 }
 
 bool Scheduler::run_tick() {

@@ -61,7 +61,7 @@ class Scheduler {
   int add(const TaskSpec& spec, Task& task);
   int add_background(const BackgroundSpec& spec, BackgroundTask& task);
 
-  void start();     // the first tick is due now
+  void start();     // the first tick is due now; once more after a pause, which counts for nothing
   bool run_tick();  // waits for the next tick and does it; false when the policy `stop` has ended the run
   void run_until(Instant end);
 
@@ -103,7 +103,7 @@ class Scheduler {
   bool count_missed(Instant t) MOLDLOFT_NONBLOCKING;
   void keep_miss(Instant t, std::uint64_t lost) MOLDLOFT_NONBLOCKING;
   void count_slips(std::uint64_t lost) MOLDLOFT_NONBLOCKING;
-  bool warm() const noexcept { return ticks_ > settings_.warm_up_ticks; }
+  bool warm() const noexcept { return ticks_ > started_after_ + settings_.warm_up_ticks; }
 
   Clock& clock_;
   SchedulerSettings settings_;
@@ -118,7 +118,7 @@ class Scheduler {
   Instant next_tick_{0}, woken_{0};
   Duration spent_before_{0};  // the thread's processor time when it went to sleep
   std::uint64_t number_ = 0;  // of the next tick, missed ones included: decides which tasks are due
-  std::uint64_t ticks_ = 0, missed_ = 0;
+  std::uint64_t ticks_ = 0, missed_ = 0, started_after_ = 0;
   std::uint32_t misses_in_a_row_ = 0;
   int longest_task_ = no_task;
   Duration longest_cost_{0};

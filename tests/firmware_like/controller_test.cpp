@@ -9,6 +9,7 @@
 
 #include "firmware_like/results.hpp"
 #include "firmware_like/run_command.hpp"
+#include "firmware_like/timing_report.hpp"
 #include "hal/cable.hpp"
 
 using namespace moldloft;

@@ -3,6 +3,7 @@
 // block the next try.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -180,4 +181,44 @@ TEST_CASE("a plate that is none is refused by what is wrong with it") {
                 "smaller plate, another place or "
                 "another arm");
   CHECK_FALSE(fs::exists(out));
+}
+
+TEST_CASE("a latency self-test that cannot be is refused in one line before anything is measured") {
+  const Workbench bench;
+  const std::string out = bench.path("self-test");
+  const auto refuses = [&](std::vector<std::string> words, const std::string& line) {
+    words.insert(words.begin(), {MOLDLOFT, "latency", "--out", out});
+    check_refused(run_program(words), "moldloft latency: " + line);
+    CHECK_FALSE(fs::exists(out));
+  };
+  refuses({"--duration", "0"}, "--duration: 0 s given; from 1 to 2592000 s");
+  refuses({"--duration", "nan"}, "--duration: nan s given; from 1 to 2592000 s");
+  refuses({"--compare", "latencytest"}, "--compare: 'latencytest' given; it knows cyclictest");
+  refuses({"--tick", "500"}, "--tick: 500 us given; from 771 to 100000 us");
+  refuses({"--tick", "-1"}, "--tick: -1 us given; from 771 to 100000 us");
+  refuses({"--config", bench.path("none.toml")},
+          bench.path("none.toml") + ": cannot be read; give the path of a cell configuration");
+  const std::string held = bench.write("held", "a file");
+  const auto in_the_way = run_program({MOLDLOFT, "latency", "--duration", "1", "--out", held + "/x"});
+  CHECK(in_the_way.exit_code == firmware_like::exit_failed);
+  CHECK(in_the_way.err.starts_with("moldloft latency: " + held + "/x: cannot be created"));
+  CHECK(in_the_way.out == "");
+}
+
+TEST_CASE("a report of what is no run, or of another version's, is refused in one line") {
+  const Workbench bench;
+  const std::string none = bench.path("none");
+  check_refused(run_program({MOLDLOFT, "report", none}),
+                "moldloft report: " + none + "/timing.json: cannot be opened");
+  fs::create_directories(bench.path("run"));
+  const std::string file = bench.write("run/timing.json", "{");
+  check_refused(run_program({MOLDLOFT, "report", bench.path("run")}),
+                "moldloft report: " + file + ": not JSON");
+  bench.write("run/timing.json", R"({"schema": 1, "ticks": 5})");
+  const auto old = run_program({MOLDLOFT, "report", bench.path("run")});
+  CHECK(old.exit_code == firmware_like::exit_failed);
+  CHECK(old.out == "");
+  CHECK(old.err.starts_with("moldloft report: " + bench.path("run") + ": was not written by this version"));
+  CHECK(std::ranges::count(old.err, '\n') == 1);
+  CHECK_FALSE(fs::exists(bench.path("run/report.html")));
 }

@@ -81,6 +81,24 @@ void check_fit_repeats(const std::string& run, const std::string& out) {
   CHECK(summary_in(out)["result"] == "complete");
 }
 
+// What the run left can be shown again, and the page comes out the same.
+void check_report(const std::string& run) {
+  const auto timing = json::parse(text_of(run + "/timing.json"));
+  CHECK(timing["frame_to_command"]["count"].get<int>() > 10);
+  CHECK(timing["frame_to_command"]["p999_us"].is_number());
+  CHECK(timing["data_age"]["p999_us"].get<double>() > timing["frame_to_command"]["p50_us"].get<double>());
+  CHECK(timing["budgets"]["tasks"].size() == 6);
+  CHECK(timing["thread"]["0"]["cycles"] == timing["wake_up"]["count"]);
+  const std::string page = text_of(run + "/report.html");
+  CHECK(page.find("From frame to command") != std::string::npos);
+  std::filesystem::remove(run + "/report.html");
+  const auto shown = run_program({MOLDLOFT, "report", run});
+  CHECK_MESSAGE(shown.exit_code == 0, shown.err);
+  CHECK(shown.out.find("frame to command ") != std::string::npos);
+  CHECK(shown.out.find("complete") != std::string::npos);
+  CHECK(text_of(run + "/report.html") == page);
+}
+
 }  // namespace
 
 TEST_CASE(
@@ -96,6 +114,7 @@ TEST_CASE(
   check_files(out);
   check_truth(out);
   check_fit_repeats(out, folder.file("fit"));
+  check_report(out);
 }
 
 TEST_CASE("a run that ctrl-C stops, then a power cut, goes on where it was with --resume") {
@@ -246,4 +265,27 @@ TEST_CASE("a run that is asked for it, then dies, leaves its last second twice, 
   const auto nothing = run_program({MOLDLOFT, "replay", folder.file("none"), "--timeline"});
   CHECK(nothing.exit_code == 1);
   CHECK(nothing.err == "moldloft: " + folder.file("none") + ": no such run or dump\n");
+}
+
+// No figure is judged here: a test must not depend on how busy its machine is.
+TEST_CASE("the timing self-test runs on this machine and leaves its report") {
+  const hal::TemporaryFolder folder;
+  const std::string out = folder.file("self-test");
+  const auto done = run_program({MOLDLOFT, "latency", "--duration", "1", "--json", "--out", out});
+  REQUIRE_MESSAGE(done.exit_code == 0, done.err);
+  CHECK(done.err == "");
+  const auto figures = json::parse(done.out);
+  CHECK(figures["ours"]["cycles"].get<int>() > 100);
+  CHECK(figures["ours"]["max_us"].get<double>() >= figures["ours"]["p50_us"].get<double>());
+  CHECK(figures["representative"].get<bool>() == figures["why"].get<std::string>().empty());
+  CHECK(figures["busy"]["points_folded"].get<int>() > 0);
+  CHECK(figures["busy"]["frames_recorded"].get<int>() > 0);
+  CHECK(figures["busy"]["records_lost"] == 0);
+  const auto timing = json::parse(text_of(out + "/timing.json"));
+  CHECK(timing["setup"].size() == 9);
+  CHECK(timing["frame_to_command"].is_null());  // there are no devices
+  CHECK(text_of(out + "/report.html").starts_with("<!DOCTYPE html>"));
+  const auto store = hal::RunStore::open(out + "/run.db", hal::RunStore::Mode::read);
+  REQUIRE_MESSAGE(store.has_value(), store.error().what);
+  CHECK(store->shots()->size() == figures["busy"]["frames_recorded"].get<std::size_t>());
 }

@@ -49,7 +49,7 @@ TEST_CASE("the default run completes, and its summary says everything that it pr
   CHECK(firmware_like::export_run({.run = cell.folder(), .step = cad.file("surface.step"), .iges = {}}) == 0);
   CHECK(text_of(cad.file("surface.step")) == cell.file("surface.step"));
   for (const char* file : {"boundary.ply", "points.ply", "surface.json", "surface.step", "surface.igs",
-                           "timing.json", "overview.svg", "events.jsonl"}) {
+                           "timing.json", "report.html", "overview.svg", "events.jsonl"}) {
     CAPTURE(file);
     CHECK(cell.file(file).size() > 100);
   }

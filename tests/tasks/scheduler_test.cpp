@@ -208,3 +208,30 @@ TEST_CASE("the running task can be read from inside it and from outside none run
   CHECK(seen == id);
   CHECK(scheduler.running_task() == Scheduler::no_task);
 }
+
+TEST_CASE("a schedule started again after a pause begins anew, and its first ticks are left out once more") {
+  ScriptedClock clock;
+  Scheduler scheduler{clock, {.tick = 1ms, .warm_up_ticks = 2, .starvation_ticks = 3}};
+  ScriptedTask task{clock, std::vector<Duration>(20, 950us)};  // leaves no room for a background step
+  ScriptedBackground fit{clock, 100, 60us};
+  scheduler.add({.name = "task", .budget = 960us}, task);
+  scheduler.add_background({.name = "fit", .quantum = 60us}, fit);
+
+  scheduler.start();
+  scheduler.run_until(5ms);
+  CHECK(scheduler.tasks()[0].runs == 3);
+  CHECK(scheduler.wake_up().count() == 3);
+  const auto before = fit.starts.size();
+
+  clock.stand_at(1s);  // the pause is no miss, and nothing has starved in it
+  scheduler.start();
+  CHECK(scheduler.next_tick() == 1s);
+  scheduler.run_until(1002ms);
+  CHECK(fit.starts.size() == before);
+  CHECK(scheduler.tasks()[0].runs == 3);  // the warm-up once more
+  scheduler.run_until(1005ms);
+  CHECK(scheduler.tasks()[0].runs == 6);
+  CHECK(scheduler.wake_up().max() == 10us);  // a forced step ran 10 us into the next tick
+  CHECK(scheduler.missed_ticks() == 0);
+  CHECK(scheduler.ticks() == 10);
+}

@@ -1,0 +1,17 @@
+// timing.json for people at a terminal: plain, aligned, at most 100 columns.
+//
+// Thread       any
+// Allocation   yes
+// Failure      throws Json::exception where a report lacks what every report has: one of another version
+#pragma once
+
+#include <string>
+
+#include "firmware_like/surface_file.hpp"
+
+namespace moldloft::firmware_like {
+
+std::string timing_table(const Json& timing);  // everything
+std::string timing_lines(const Json& timing);  // what one wants to know at the end of a run
+
+}  // namespace moldloft::firmware_like

@@ -1,0 +1,219 @@
+// What people read of a timing report: the table on a terminal and the page.
+#include "firmware_like/timing_page.hpp"
+
+#include <doctest/doctest.h>
+
+#include <regex>
+#include <sstream>
+
+#include "firmware_like/latency_command.hpp"
+#include "firmware_like/log_plot.hpp"
+#include "firmware_like/recorded_cyclictest.hpp"
+#include "firmware_like/timing_table.hpp"
+#include "tasks/scripted_clock.hpp"
+
+using namespace moldloft;
+using namespace moldloft::firmware_like;
+using namespace std::chrono_literals;
+
+namespace {
+
+// A run of 2000 ticks with one miss, compared with the recorded cyclictest, on a machine that is not fit for it.
+Json report() {
+  tasks::ScriptedClock clock;
+  std::vector<hal::Duration> costs(3000, 120us);
+  costs[700] = 3300us;
+  tasks::ScriptedTask first{clock, costs}, second{clock, {}};
+  tasks::ScriptedBackground fit{clock, 500, 80us};
+  tasks::Scheduler scheduler{clock, {.tick = 1ms}};
+  scheduler.add({.name = "scanner <in> & \"out\"", .budget = 200us}, first);
+  scheduler.add({.name = "health", .period_ticks = 100, .budget = 20us}, second);
+  scheduler.add_background({.name = "surface", .quantum = 100us}, fit);
+  clock.oversleep = 21us;
+  scheduler.start();
+  scheduler.run_until(2s);
+  RunConditions conditions;
+  conditions.environment.release = "6.1.0-rt";
+  conditions.environment.virtual_machine = true;
+  conditions.environment.virtual_found_by = "the processor's flags";
+  conditions.setup.push_back({SetupItem::memory_lock, "all pages", "<none>", false, false, "raise memlock"});
+  Json t = timing_report({.scheduler = scheduler, .conditions = &conditions});
+  t["compared"] = comparison_json(scheduler.wake_up(), *parse_cyclictest(recorded_cyclictest));
+  return t;
+}
+
+// Every element is closed in its order; gives what is wrong, or nothing. Attributes are in double quotes.
+std::string flaw_of(const std::string& html) {
+  static const std::regex tag{R"re(<(/?)([a-zA-Z][a-zA-Z0-9]*)((?:\s+[a-zA-Z-]+="[^"<]*")*)\s*(/?)>)re"};
+  std::vector<std::string> open;
+  std::size_t at = html.find('<', 1);  // after the doctype
+  for (; at != html.npos; at = html.find('<', at + 1)) {
+    std::smatch m;
+    const auto from = html.begin() + static_cast<std::ptrdiff_t>(at);
+    if (!std::regex_search(from, html.end(), m, tag, std::regex_constants::match_continuous))
+      return "no tag: " + html.substr(at, 40);
+    if (m[4] == "/") continue;
+    if (m[1] == "") {
+      open.push_back(m[2]);
+    } else if (open.empty() || open.back() != m[2]) {
+      return "closes " + m[2].str() + " inside " + (open.empty() ? "nothing" : open.back());
+    } else {
+      open.pop_back();
+    }
+  }
+  return open.empty() ? "" : open.back() + " stays open";
+}
+
+std::size_t count_of(const std::string& text, const std::string& what) {
+  std::size_t n = 0;
+  for (auto at = text.find(what); at != text.npos; at = text.find(what, at + 1)) ++n;
+  return n;
+}
+
+std::string numbered(const std::string& text, const std::string& begin) {
+  std::istringstream lines{text};
+  for (std::string line; std::getline(lines, line);)
+    if (line.starts_with(begin)) return line;
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("the check of the page finds what is not well formed") {
+  CHECK(flaw_of("<!DOCTYPE html><p>a<b>c</b></p>") == "");
+  CHECK(flaw_of("<!DOCTYPE html><p>a<b>c</p></b>") == "closes p inside b");
+  CHECK(flaw_of("<!DOCTYPE html><p>a") == "p stays open");
+  CHECK(flaw_of("<!DOCTYPE html><p>1 < 2</p>") == "no tag: < 2</p>");
+  CHECK(flaw_of("<!DOCTYPE html><p class=\"a\"b\">1</p>") != "");
+}
+
+TEST_CASE("the page is one well-formed file that loads nothing and runs nothing") {
+  const std::string page = timing_page(report(), "Timing of <plate> & \"co\"");
+  CHECK(flaw_of(page) == "");
+  CHECK(page.starts_with("<!DOCTYPE html>"));
+  CHECK(page.find("<script") == page.npos);
+  CHECK(page.find("http") == page.npos);
+  CHECK(page.find("url(") == page.npos);
+  CHECK(page.find("@import") == page.npos);
+  CHECK(page.find("src=") == page.npos);
+  CHECK(page.find("href=") == page.npos);
+  CHECK(page.find("<title>Timing of &lt;plate&gt; &amp; &quot;co&quot;</title>") != page.npos);
+  CHECK(page.find("scanner &lt;in&gt; &amp; &quot;out&quot;") != page.npos);
+  CHECK(page.find("&lt;none&gt;") != page.npos);
+  CHECK(page.find("prefers-color-scheme:dark") != page.npos);
+  CHECK(page.find("@media print") != page.npos);
+}
+
+TEST_CASE("the page says first whether the run is representative, and why not") {
+  const Json t = report();
+  const std::string page = timing_page(t, "run");
+  const auto verdict = page.find("Not representative:</b> ");
+  REQUIRE(verdict != page.npos);
+  CHECK(verdict < page.find("<h2>"));
+  CHECK(page.find("virtual") != page.npos);
+  Json good = t;
+  good["representative"] = true;
+  CHECK(timing_page(good, "run").find("<b>Representative.</b>") != std::string::npos);
+}
+
+TEST_CASE("the page shows ours and cyclictest in one drawing, every task, miss and budget") {
+  const std::string page = timing_page(report(), "run");
+  CHECK(count_of(page, "<path class=\"s0\"") == 3);  // wake-up, execution, slack
+  CHECK(count_of(page, "<path class=\"s1\"") == 1);
+  CHECK(page.find("ours, with fit and recorder busy") != page.npos);
+  CHECK(page.find("cyclictest, alone") != page.npos);
+  for (const char* heading : {"How late a tick begins", "Everything that was timed", "Missed ticks", "Tasks",
+                              "Budgets", "Process set-up", "The machine"}) {
+    CAPTURE(heading);
+    CHECK(count_of(page, "<h2>" + std::string{heading} + "</h2>") == 1);
+  }
+  CHECK(page.find("computing: 3") != page.npos);  // ticks 701 to 703
+  CHECK(page.find(std::string{budget_rule}) != page.npos);
+}
+
+TEST_CASE("a run in virtual time has a page without machine and comparison") {
+  Json t = report();
+  for (const char* key : {"compared", "environment", "setup"}) t.erase(key);
+  const std::string page = timing_page(t, "run");
+  CHECK(flaw_of(page) == "");
+  CHECK(page.find("The machine") == page.npos);
+  CHECK(count_of(page, "<path class=\"s1\"") == 0);
+}
+
+TEST_CASE("one value among a hundred thousand stands clear of the axis, in its place") {
+  tasks::Histogram h;
+  for (int i = 0; i < 100'000; ++i) h.add(10us);
+  h.add(10ms);
+  const std::string svg = log_plot({.series = {{"ours", h}}, .label = "latency"});
+  CHECK(flaw_of("<!DOCTYPE html>" + svg) == "");
+  std::smatch path;
+  REQUIRE(
+      std::regex_search(svg, path, std::regex{R"re(<path class="s0" d="M([0-9.]+) ([0-9.]+)([^"]*)V)re"}));
+  const double bottom = std::stod(path[2]);
+  // Heights in order: where the outline leaves the bottom, and how high.
+  std::vector<double> heights;
+  double right_of_last = 0;
+  const std::string steps = path[3];
+  const std::regex step{R"(V([0-9.]+)H([0-9.]+))"};
+  for (std::sregex_iterator it{steps.begin(), steps.end(), step}, end; it != end; ++it) {
+    const double up = bottom - std::stod((*it)[1]);
+    if (up <= 0) continue;
+    heights.push_back(up);
+    right_of_last = std::stod((*it)[2]);
+  }
+  REQUIRE(heights.size() == 2);
+  CHECK(heights[0] > heights[1]);
+  CHECK(heights[1] > 10);  // px
+  // Three decades lie between the two; both stand within the axes.
+  CHECK(right_of_last <= 902);
+  CHECK(right_of_last > 850);
+}
+
+TEST_CASE("what is smaller than the plot begins with stands in its first bar") {
+  tasks::Histogram h;
+  for (int i = 0; i < 50; ++i) h.add(0ns);
+  h.add(900us);
+  const auto left_edge = [&](hal::Duration smallest) {
+    const std::string svg = log_plot({.series = {{"", h}}, .label = "slack", .smallest = smallest});
+    CHECK(svg.find(">1 ns<") == std::string::npos);
+    return svg.find(">10 us<") != std::string::npos && svg.find(">1 us<") == std::string::npos;
+  };
+  CHECK(left_edge(10us));
+  CHECK_FALSE(left_edge(100ns));
+}
+
+TEST_CASE("durations are written as people say them") {
+  CHECK(time_text(0ns) == "0 ns");
+  CHECK(time_text(870ns) == "870 ns");
+  CHECK(time_text(1us) == "1 us");
+  CHECK(time_text(1'500ns) == "1.50 us");
+  CHECK(time_text(23'400ns) == "23.4 us");
+  CHECK(time_text(1985us) == "1.99 ms");
+  CHECK(time_text(100ms) == "100 ms");
+  CHECK(time_text(68s) == "68 s");
+}
+
+TEST_CASE("the table fits a terminal of a hundred columns and tells everything") {
+  const Json t = report();
+  const std::string table = timing_table(t);
+  std::istringstream lines{table};
+  for (std::string line; std::getline(lines, line);) {
+    CAPTURE(line);
+    CHECK(line.size() <= 100);
+    CHECK((line.empty() || line.back() != ' '));
+  }
+  CHECK(numbered(table, "missed ticks") ==
+        "missed ticks        3 of 1997: woken late 0, preempted 0, computing 3");
+  CHECK(numbered(table, "  at").find("lost 3") != std::string::npos);
+  CHECK(numbered(table, "frame to command") == "frame to command    not measured");
+  CHECK(numbered(table, "  health").find("100") != std::string::npos);
+  CHECK(numbered(table, "representative").starts_with("representative      NO: "));
+  CHECK(numbered(table, "ratio").find("0.3") != std::string::npos);  // 21 us to 64.5
+}
+
+TEST_CASE("the end of a run shows wake-up, misses, load and the verdict, and no more") {
+  const std::string lines = timing_lines(report());
+  CHECK(count_of(lines, "\n") == 4);
+  CHECK(numbered(lines, "wake-up latency").find("p99.9") != std::string::npos);
+  CHECK(numbered(lines, "load").starts_with("load                table 12"));
+}
