@@ -19,8 +19,10 @@
 #include "firmware_like/results.hpp"
 #include "firmware_like/run_command.hpp"
 #include "firmware_like/task_table.hpp"
+#include "firmware_like/thread_counts.hpp"
 #include "firmware_like/timing_page.hpp"
 #include "firmware_like/timing_table.hpp"
+#include "hal/realtime_section.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -90,6 +92,7 @@ class Turns {
     done_.acquire();
   }
   const ControlThread& control() const { return control_; }
+  const ThreadCounts& counts() const { return counts_; }  // of all turns so far
 
  private:
   void work() {
@@ -97,13 +100,25 @@ class Turns {
       auto& scheduler = load_.scheduler();
       scheduler.start();
       const auto end = scheduler.next_tick() + ticks_ * scheduler.settings().tick;
-      while (scheduler.next_tick() < end && !interrupted && scheduler.run_tick()) {
+      const auto warm = scheduler.ticks() + scheduler.settings().warm_up_ticks;
+      const auto goes_on = [&] {
+        return scheduler.next_tick() < end && !interrupted && scheduler.run_tick();
+      };
+      while (scheduler.ticks() < warm && goes_on()) {
       }
+      ThreadCounter counter;
+      hal::RealtimeSection::begin();
+      do {
+        counter.at_tick();
+      } while (goes_on());
+      hal::RealtimeSection::end();
+      counts_ += counter.so_far();
       done_.release();
     }
   }
   LatencyLoad& load_;
   std::int64_t ticks_;
+  ThreadCounts counts_;
   bool over_ = false;
   std::binary_semaphore go_{0}, done_{0};
   ControlThread control_;
@@ -156,6 +171,7 @@ std::expected<Measured, RunError> measure(LatencyLoad& load, RunFolder& folder, 
     if (!theirs) return std::unexpected{theirs.error()};
     add(m.cyclictest, *theirs);
   }
+  m.conditions.control_thread = turns.counts();
   return m;
 }
 

@@ -188,8 +188,11 @@ void LatencyLoad::measure(hal::Instant) {
 }
 
 void LatencyLoad::walk_the_edge() {
-  if (looked_at_ != nullptr && view_.found()) surface_.keep(view_, looked_at_->world_from_scanner);
-  looked_at_ = nullptr;
+  if (looked_at_ != nullptr && view_.found()) {
+    surface_.keep(view_, looked_at_->world_from_scanner);
+    looked_at_ = nullptr;
+    return;
+  }
   if (!look_at_next(true)) surface_.build_outline(edge_points_, corners_);
 }
 

@@ -14,6 +14,7 @@
 
 #include "firmware_like/config.hpp"
 #include "hal/flight_recorder.hpp"
+#include "hal/realtime.hpp"
 #include "hal/recorder.hpp"
 #include "hal/tapped_link.hpp"
 #include "tasks/scheduler.hpp"
@@ -25,16 +26,18 @@ namespace moldloft::firmware_like {
 class FrameWire final : public hal::ByteLink {
  public:
   explicit FrameWire(std::vector<std::byte> frame) : frame_{std::move(frame)}, sent_{frame_.size()} {}
-  void begin_frame() noexcept { sent_ = 0; }
-  bool idle() const noexcept { return sent_ == frame_.size(); }
+  void begin_frame() noexcept MOLDLOFT_NONBLOCKING { sent_ = 0; }
+  bool idle() const noexcept MOLDLOFT_NONBLOCKING { return sent_ == frame_.size(); }
   std::size_t frame_size() const noexcept { return frame_.size(); }
 
-  void open() override {}
-  void close() noexcept override {}
-  std::size_t read(std::span<std::byte> out) noexcept override;
-  std::size_t write(std::span<const std::byte> in) noexcept override { return in.size(); }
-  hal::LinkState state() noexcept override { return hal::LinkState::open; }
-  std::string_view why() const noexcept override { return ""; }
+  void open() MOLDLOFT_NONBLOCKING override {}
+  void close() noexcept MOLDLOFT_NONBLOCKING override {}
+  std::size_t read(std::span<std::byte> out) noexcept MOLDLOFT_NONBLOCKING override;
+  std::size_t write(std::span<const std::byte> in) noexcept MOLDLOFT_NONBLOCKING override {
+    return in.size();
+  }
+  hal::LinkState state() noexcept MOLDLOFT_NONBLOCKING override { return hal::LinkState::open; }
+  std::string_view why() const noexcept MOLDLOFT_NONBLOCKING override { return ""; }
 
  private:
   std::vector<std::byte> frame_;
@@ -69,19 +72,19 @@ class LatencyLoad {
   };
   struct Row {
     LatencyLoad* owner;
-    void (LatencyLoad::*function)(hal::Instant);
-    void operator()(hal::Instant now) const { (owner->*function)(now); }
+    void (LatencyLoad::*function)(hal::Instant) MOLDLOFT_NONBLOCKING;
+    void operator()(hal::Instant now) const MOLDLOFT_NONBLOCKING { (owner->*function)(now); }
   };
   using RowTask = tasks::FunctionTask<Row>;
 
   static std::vector<Shot> shots_of_a_plate(const CellConfig&);
   static std::vector<std::byte> on_the_wire(const CellConfig&, const hal::Frame&);
-  void receive(hal::Instant now);
-  void frame_arrived(hal::Instant now);
-  void measure(hal::Instant now);
-  void walk_the_edge();
-  void sweep();
-  bool look_at_next(bool at_the_edge_only);
+  void receive(hal::Instant now) MOLDLOFT_NONBLOCKING;
+  void frame_arrived(hal::Instant now) MOLDLOFT_NONBLOCKING;
+  void measure(hal::Instant now) MOLDLOFT_NONBLOCKING;
+  void walk_the_edge() MOLDLOFT_NONBLOCKING;
+  void sweep() MOLDLOFT_NONBLOCKING;
+  bool look_at_next(bool at_the_edge_only) MOLDLOFT_NONBLOCKING;
 
   hal::Clock& clock_;
   std::vector<Shot> shots_;

@@ -22,6 +22,17 @@ ThreadCounts counts_now() noexcept {
 
 }  // namespace
 
+ThreadCounts& ThreadCounts::operator+=(const ThreadCounts& other) noexcept {
+  ticks += other.ticks;
+  minor_faults += other.minor_faults;
+  major_faults += other.major_faults;
+  voluntary_switches += other.voluntary_switches;
+  involuntary_switches += other.involuntary_switches;
+  migrations += other.migrations;
+  suspensions += other.suspensions;
+  return *this;
+}
+
 ThreadCounter::ThreadCounter() noexcept : start_{counts_now()}, cpu_{sched_getcpu()} {}
 
 void ThreadCounter::at_tick() noexcept {

@@ -25,6 +25,8 @@ struct ThreadCounts {
   std::uint64_t involuntary_switches = 0;  // another thread took the CPU away
   std::uint64_t migrations = 0;            // ticks that began on another CPU than the one before
   std::uint64_t suspensions = 0;  // of the promise: a link was closed or opened (hal/realtime_section.hpp)
+
+  ThreadCounts& operator+=(const ThreadCounts&) noexcept;
 };
 
 class ThreadCounter {

@@ -294,6 +294,23 @@ std::string budgets(const Json& t) {
       table({{"us"}, {"runs"}, {"p99.9"}, {"max"}, {"declared"}, {"suggested"}, {"judged", "word"}}, rows));
 }
 
+// What the operating system did to the control thread after its first ticks.
+std::string control_thread(const Json& t) {
+  if (!t.contains("control_thread")) return "";
+  const Json& c = t.at("control_thread");
+  return section(
+      "The control thread",
+      "Counted by the kernel after the first ticks. A thread that only sleeps to its ticks gives the "
+      "processor away once a tick.",
+      table({{"ticks"}, {"page faults"}, {"gave way"}, {"preempted"}, {"moved"}},
+            row({{figure(c, "ticks")},
+                 {fmt::format("{}", c.at("minor_faults").get<std::uint64_t>() +
+                                        c.at("major_faults").get<std::uint64_t>())},
+                 {figure(c, "voluntary_switches")},
+                 {figure(c, "involuntary_switches")},
+                 {figure(c, "migrations")}})));
+}
+
 std::string machine(const Json& t) {
   if (!t.contains("environment")) return "";
   std::string rows;
@@ -338,7 +355,7 @@ std::string timing_page(const Json& t, std::string_view title) {
       plot_of(t, "frame_to_command", "From frame to command",
               "From the last byte of a frame read to the command that it decided handed to the robot's link.",
               "frame to command", 100ns);
-  html += distributions(t) + misses(t) + tasks_section(t) + budgets(t) + machine(t);
+  html += distributions(t) + misses(t) + tasks_section(t) + budgets(t) + control_thread(t) + machine(t);
   return html + "</main>\n</body>\n</html>\n";
 }
 

@@ -123,13 +123,23 @@ std::string budgets(const Json& t) {
   return s + "  suggested: " + text(b, "rule") + "\n";
 }
 
+std::string line(std::string_view name, int width, const std::string& value) {
+  return fmt::format("{:<{}}{}\n", name, width, value);
+}
+
+// A tick costs one voluntary switch: the sleep to the next.
+std::string system_counts(const Json& t) {
+  if (!t.contains("control_thread")) return "";
+  const Json& c = t.at("control_thread");
+  return line("control thread", name_width,
+              fmt::format("{} page faults, {} times preempted, {} moves to another processor, in {} ticks",
+                          number(c, "minor_faults") + number(c, "major_faults"),
+                          number(c, "involuntary_switches"), number(c, "migrations"), number(c, "ticks")));
+}
+
 std::string verdict(const Json& t) {
   const bool yes = t.contains("representative") && t.at("representative").get<bool>();
   return yes ? std::string{"yes"} : "NO: " + text(t, "why");
-}
-
-std::string line(std::string_view name, int width, const std::string& value) {
-  return fmt::format("{:<{}}{}\n", name, width, value);
 }
 
 std::string comparison(const Json& t) {
@@ -148,8 +158,8 @@ std::string comparison(const Json& t) {
 
 std::string timing_table(const Json& t) {
   return comparison(t) + histograms(t) + "\n" + line("missed ticks", name_width, missed(t)) +
-         first_misses(t) + line("load", name_width, load(t)) + "\n" + task_counts(t) + "\n" + budgets(t) +
-         "\n" + line("representative", name_width, verdict(t));
+         first_misses(t) + line("load", name_width, load(t)) + system_counts(t) + "\n" + task_counts(t) +
+         "\n" + budgets(t) + "\n" + line("representative", name_width, verdict(t));
 }
 
 std::string timing_lines(const Json& t) {

@@ -37,6 +37,13 @@ Json report() {
   conditions.environment.virtual_machine = true;
   conditions.environment.virtual_found_by = "the processor's flags";
   conditions.setup.push_back({SetupItem::memory_lock, "all pages", "<none>", false, false, "raise memlock"});
+  conditions.control_thread = {.ticks = 1990,
+                               .minor_faults = 4,
+                               .major_faults = 1,
+                               .voluntary_switches = 1990,
+                               .involuntary_switches = 3,
+                               .migrations = 1,
+                               .suspensions = 0};
   Json t = timing_report({.scheduler = scheduler, .conditions = &conditions});
   t["compared"] = comparison_json(scheduler.wake_up(), *parse_cyclictest(recorded_cyclictest));
   return t;
@@ -123,7 +130,7 @@ TEST_CASE("the page shows ours and cyclictest in one drawing, every task, miss a
   CHECK(page.find("ours, with fit and recorder busy") != page.npos);
   CHECK(page.find("cyclictest, alone") != page.npos);
   for (const char* heading : {"How late a tick begins", "Everything that was timed", "Missed ticks", "Tasks",
-                              "Budgets", "Process set-up", "The machine"}) {
+                              "Budgets", "The control thread", "Process set-up", "The machine"}) {
     CAPTURE(heading);
     CHECK(count_of(page, "<h2>" + std::string{heading} + "</h2>") == 1);
   }
@@ -207,6 +214,8 @@ TEST_CASE("the table fits a terminal of a hundred columns and tells everything")
   CHECK(numbered(table, "  at").find("lost 3") != std::string::npos);
   CHECK(numbered(table, "frame to command") == "frame to command    not measured");
   CHECK(numbered(table, "  health").find("100") != std::string::npos);
+  CHECK(numbered(table, "control thread") ==
+        "control thread      5 page faults, 3 times preempted, 1 moves to another processor, in 1990 ticks");
   CHECK(numbered(table, "representative").starts_with("representative      NO: "));
   CHECK(numbered(table, "ratio").find("0.3") != std::string::npos);  // 21 us to 64.5
 }
