@@ -213,7 +213,7 @@ bool LatencyLoad::look_at_next(bool at_the_edge_only) {
     return false;
   }
   looked_at_ = &shots_[next_shot_++];
-  view_.begin(looked_at_->frame, Eigen::Vector3d::Zero(), reach_mm);
+  view_.begin(looked_at_->frame, {.reach_mm = reach_mm, .boundary = at_the_edge_only});
   surface_.look(view_);
   return true;
 }
