@@ -20,7 +20,7 @@ int Scheduler::add_background(const BackgroundSpec& spec, BackgroundTask& task) 
   assert(background_count_ < max_background);
   background_[background_count_] = &task;
   background_records_[background_count_].spec = spec;
-  peak_[background_count_] = spec.quantum;
+  peak_[background_count_].fill(spec.quantum);
   const int id = background_base + static_cast<int>(background_count_++);
   if (flight_ != nullptr) flight_->name(id, spec.name);
   return id;
@@ -126,20 +126,36 @@ void Scheduler::run_background(Instant& t, Instant limit) {
   if (stepped && warm()) pushed_.add(t - before_all);
 }
 
+bool Scheduler::step_fits(std::size_t i, std::size_t kind, Instant t, Instant limit) const {
+  const Duration quantum = background_records_[i].spec.quantum;
+  const Instant latest_end = limit + settings_.guard + settings_.late_tolerance;
+  if (kind == 0) return t + std::max(quantum, peak_[i][kind]) <= limit;
+  return t + peak_[i][kind] <= limit && t + quantum <= latest_end;
+}
+
+// Upwards at once, and down by 1/128 of the difference a run: one preempted step does not keep the task out for long.
+void Scheduler::follow_peak(std::size_t i, std::size_t kind, Duration cost) {
+  Duration& peak = peak_[i][kind];
+  const Duration floor = kind == 0 ? std::max(background_records_[i].spec.quantum, cost) : cost;
+  peak = std::max(floor, peak - (peak - floor) / 128);
+}
+
 bool Scheduler::step_background(std::size_t i, Instant& t, Instant limit, bool& may_force) {
   auto& record = background_records_[i];
   if (!background_[i]->has_work()) {
     last_run_tick_[i] = ticks_;
     return false;
   }
-  if (t + peak_[i] > limit) {
+  const std::size_t kind = background_[i]->next_kind();
+  assert(kind < step_kinds);
+  if (!step_fits(i, kind, t, limit)) {
     // A forced step may use up the guard time and make the next tick late, never missed; and it does not come on top of
     // a table that is late itself.
     const bool starving = ticks_ - last_run_tick_[i] >= settings_.starvation_ticks;
     const Instant due = limit + settings_.guard;
     if (!starving || !may_force || t > due || t + record.spec.quantum > due + settings_.late_tolerance) {
       if (last_run_tick_[i] != ticks_) ++record.refused;
-      peak_[i] = std::max(record.spec.quantum, peak_[i] / 2);
+      peak_[i][kind] = std::max(record.spec.quantum, peak_[i][kind] / 2);
       return false;
     }
     may_force = false;
@@ -154,9 +170,7 @@ bool Scheduler::step_background(std::size_t i, Instant& t, Instant limit, bool& 
   t = clock_.now();
   const Duration cost = t - began;
   if (flight_ != nullptr) flight_->note(FlightKind::background, id, began, cost);
-  // The peak follows upwards at once and comes down by 1/128 of the difference a run: one preempted step does not keep
-  // the task out for long.
-  peak_[i] = std::max({record.spec.quantum, cost, peak_[i] - (peak_[i] - record.spec.quantum) / 128});
+  follow_peak(i, kind, cost);
   last_run_tick_[i] = ticks_;
   ++record.runs;
   record.cost.add(cost);

@@ -7,11 +7,13 @@
 //              Costs are by the clock. The thread's own processor time is read once a tick, between two ticks, and
 //              once more where a tick was missed: it tells a long task from one that was preempted
 // Background   a step runs only if the larger of its declared quantum and its decaying measured peak fits between now
-//              and the guard time before the next tick. A task that does not fit has its peak halved towards the
-//              declared quantum; after `starvation_ticks` without a run it gets one step (counted as forced) as soon as
-//              its quantum ends within the guard time or the tolerance of a late tick, at most one forced step of all
-//              tasks a tick. So background work that keeps its quantum moves the start of a tick by no more than that,
-//              and never costs one; a table that keeps its budgets leaves room in every tick (task_table.hpp)
+//              and the guard time before the next tick; a step of a kind whose pieces cost alike (next_kind())
+//              already if its kind's measured peak does, and the quantum would end within the tolerance of a late
+//              tick. What does not fit has its peak halved towards the declared quantum; after `starvation_ticks`
+//              without a run a task gets one step (counted as forced) as soon as its quantum ends within the guard
+//              time or that tolerance, at most one forced step of all tasks a tick. So background work that keeps its
+//              quantum moves the start of a tick by no more than that, and never costs one; a table that keeps its
+//              budgets leaves room in every tick (task_table.hpp)
 // Thread       add*() before start(); run*() on the control thread; running_task() and heartbeat() from anywhere
 // Blocking     only in Clock::sleep_until, between ticks
 // Allocation   none: the tables are arrays of fixed size
@@ -69,7 +71,7 @@ class Scheduler {
   int running_task() const noexcept { return running_.load(std::memory_order_relaxed); }
   std::uint64_t heartbeat() const noexcept {
     return heartbeat_.load(std::memory_order_relaxed);
-  }                                          // ticks done
+  }                                                               // ticks done
   std::string_view name_of(int task) const MOLDLOFT_NONBLOCKING;  // a constant after the last add*()
 
   // ---- on the control thread, or when it has come to rest
@@ -100,6 +102,8 @@ class Scheduler {
   void count_run(std::size_t i, Instant began, Duration cost, Instant allowed_start) MOLDLOFT_NONBLOCKING;
   void run_background(Instant& t, Instant limit) MOLDLOFT_NONBLOCKING;
   bool step_background(std::size_t i, Instant& t, Instant limit, bool& may_force) MOLDLOFT_NONBLOCKING;
+  bool step_fits(std::size_t i, std::size_t kind, Instant t, Instant limit) const MOLDLOFT_NONBLOCKING;
+  void follow_peak(std::size_t i, std::size_t kind, Duration cost) MOLDLOFT_NONBLOCKING;
   bool count_missed(Instant t) MOLDLOFT_NONBLOCKING;
   void keep_miss(Instant t, std::uint64_t lost) MOLDLOFT_NONBLOCKING;
   void count_slips(std::uint64_t lost) MOLDLOFT_NONBLOCKING;
@@ -112,7 +116,7 @@ class Scheduler {
   std::array<TaskRecord, max_tasks> records_{};
   std::array<BackgroundTask*, max_background> background_{};
   std::array<BackgroundRecord, max_background> background_records_{};
-  std::array<Duration, max_background> peak_{};
+  std::array<std::array<Duration, step_kinds>, max_background> peak_{};
   std::array<std::uint64_t, max_background> last_run_tick_{};
   std::size_t task_count_ = 0, background_count_ = 0, next_background_ = 0;
   Instant next_tick_{0}, woken_{0};

@@ -76,6 +76,21 @@ bool ShotView::step() {
   return true;
 }
 
+std::size_t ShotView::next_kind() const {
+  switch (stage_) {
+    case Stage::unpack:
+      return 1;
+    case Stage::cut:
+      return 2;
+    case Stage::find:
+      return finder_.describes() ? 4 : 3;
+    case Stage::boundary:
+    case Stage::done:
+      return 0;
+  }
+  return 0;
+}
+
 bool ShotView::end() {
   stage_ = Stage::done;
   rewind(1);

@@ -38,6 +38,8 @@ class ShotView {
   // In bounded pieces: begin(), then step() until it says true, then found() and the rest may be asked.
   void begin(const hal::Frame& frame, const Request&, hal::Scanner* unpacks = nullptr) MOLDLOFT_NONBLOCKING;
   bool step() MOLDLOFT_NONBLOCKING;
+  // Of the pieces, those that cost alike (BackgroundTask::next_kind()); 0 for the others.
+  std::size_t next_kind() const MOLDLOFT_NONBLOCKING;
   bool found() const { return !runs_.empty(); }
 
   const geometry::BoundaryViewer::View& boundary() const { return boundary_; }

@@ -71,6 +71,7 @@ class SurfaceTask final : public BackgroundTask {
 
   bool has_work() const override;
   void step(Instant deadline) override;
+  std::size_t next_kind() const override { return looking() ? looking_at_->next_kind() : 0; }
 
   Stage stage() const { return stage_; }
   bool outline_ready() const { return stage_ >= Stage::folding_reserve && stage_ != Stage::failed; }

@@ -47,7 +47,11 @@ class BackgroundTask {
   // One bounded piece of work. `deadline` - now is the time left: a task that can work in slices fills it and
   // returns before it; it is never nearer than the declared quantum.
   virtual void step(Instant deadline) MOLDLOFT_NONBLOCKING = 0;
+  // What kind of piece the next step is, 1 to step_kinds - 1, where the pieces of a kind cost alike: such a step runs
+  // if what its kind has been measured to take fits. Kind 0: only the declared quantum is certain.
+  virtual std::size_t next_kind() const MOLDLOFT_NONBLOCKING { return 0; }
 };
+inline constexpr std::size_t step_kinds = 8;
 
 enum class Criticality { vital, ordinary };  // an overrun of a vital task freezes the flight recorder
 

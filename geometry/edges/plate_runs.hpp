@@ -79,6 +79,9 @@ class PlateRunFinder {
                                          const PlateRunSettings& settings) MOLDLOFT_GEOMETRY_NONBLOCKING;
   std::expected<bool, Error> find_plate(std::size_t at_most_runs, const Eigen::Vector3d& hint,
                                         const PlateRunSettings& settings) MOLDLOFT_GEOMETRY_NONBLOCKING;
+  bool describes() const MOLDLOFT_GEOMETRY_NONBLOCKING {  // find_plate() has come to the costlier half
+    return stage_ == Stage::describe;
+  }
   std::span<const PlateRun> plate_runs() const MOLDLOFT_GEOMETRY_NONBLOCKING { return found_; }
 
   std::size_t bytes() const;

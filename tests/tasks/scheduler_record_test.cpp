@@ -187,6 +187,53 @@ TEST_CASE("background work that keeps its quantum never moves the next tick by m
   CHECK(forced_runs > 500);
 }
 
+TEST_CASE("steps of a kind that costs alike fill the slack by what they were measured to take") {
+  ScriptedClock clock;
+  Scheduler scheduler{clock, every_millisecond()};
+  ScriptedTask task{clock, {}};
+  ScriptedBackground look{clock, 1000, 10us};
+  look.kind = 2;
+  scheduler.add({.name = "task", .budget = 200us}, task);
+  scheduler.add_background({.name = "look", .quantum = 200us}, look);
+  scheduler.start();
+  scheduler.run_tick();
+  // The first is counted as the quantum, as long as it is new; then the peak comes down by 1/128 of the rest a run, and
+  // no step begins later than a quantum before the end of the tolerance, 1100 us.
+  REQUIRE(look.starts.size() > 80);
+  CHECK(look.starts[1] == 10us);
+  CHECK(look.starts.back() > 700us);
+  CHECK(look.starts.back() <= 900us - 10us);
+  for (int i = 0; i < 20; ++i) scheduler.run_tick();
+  CHECK(look.starts.back() == 20ms + 890us);  // up to the guard
+  // One piece takes the whole quantum after all: the next tick is late, not missed, and the peak knows.
+  look.cost = 200us;
+  scheduler.run_tick();
+  CHECK(scheduler.missed_ticks() == 0);
+  CHECK(scheduler.pushed().max() == 0us);
+  look.cost = 10us;
+  const std::size_t before = look.starts.size();
+  scheduler.run_tick();
+  CHECK(look.starts[before] == 22ms);
+  CHECK(look.starts.back() < 22ms + 800us);
+}
+
+TEST_CASE("a kind of its own neither knows nor spoils what another kind takes") {
+  ScriptedClock clock;
+  Scheduler scheduler{clock, every_millisecond()};
+  ScriptedBackground look{clock, 100'000, 10us};
+  look.kind = 1;
+  scheduler.add_background({.name = "look", .quantum = 200us}, look);
+  scheduler.start();
+  for (int i = 0; i < 30; ++i) scheduler.run_tick();
+  CHECK(look.starts.back() == 29ms + 890us);
+  look.kind = 0;
+  scheduler.run_tick();
+  CHECK(look.starts.back() == 30ms + 700us);  // the declared quantum before the guard
+  look.kind = 1;
+  scheduler.run_tick();
+  CHECK(look.starts.back() == 31ms + 890us);
+}
+
 TEST_CASE("no width of an older counter is a wrap of ours") {
   // Nanoseconds and microseconds in 32 bits signed and not, milliseconds in 32 bits, ticks in 16 and 32, doubles at
   // 2^53 ns: the schedule begins 2.5 ms before each and goes across it.

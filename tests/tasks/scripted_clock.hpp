@@ -54,8 +54,10 @@ class ScriptedBackground final : public BackgroundTask {
     --pieces;
     clock_.pass(cost);
   }
+  std::size_t next_kind() const override { return kind; }
   int pieces;
   Duration cost;
+  std::size_t kind = 0;
   std::vector<Instant> starts;
 
  private:
