@@ -35,7 +35,9 @@ std::string status_line(const tasks::CellProgress& p) {
   if (p.boundary_shots > 0) line += fmt::format(", {} boundary shots", p.boundary_shots);
   if (p.surface_planned > 0)
     line += fmt::format(", {} of {} surface shots", p.surface_shots, p.surface_planned);
-  if (!p.why.empty()) line += fmt::format(": {}", p.why.view());
+  // After a stop the reason of a hold before it is history.
+  if (!p.why.empty() && p.state != tasks::CellState::stopping && p.state != tasks::CellState::stopped)
+    line += fmt::format(": {}", p.why.view());
   return line;
 }
 

@@ -45,7 +45,11 @@ void ServiceWatch::look(const LoopSight& sight, hal::Instant now) {
     ticks_ = sight.ticks;
     if (told_) tell_recovery(sight);
     standing_ = 0ns;
-    if (!std::exchange(ready_, true)) notify_.ready(sight.status);
+    if (!std::exchange(ready_, true)) {
+      notify_.ready(sight.status);
+      status_ = sight.status;
+      last_status_ = now;
+    }
   } else if (ready_) {
     standing_ += passed;
   }

@@ -67,7 +67,7 @@ class Gate(unittest.TestCase):
 
     def test_a_missed_tick(self):
         def missed(files): files["run/timing.json"] |= {"missed_ticks": 1, "missed_by_cause": {"computing": 1}}
-        self.refuses(missed, "run: 1 missed ticks, the last by 'surface'; 0 allowed")
+        self.refuses(missed, "run: 1 missed ticks, {'computing': 1}; 0 allowed")
 
     def test_wake_up_later_than_the_limits(self):
         def late(files): files["run/timing.json"]["wake_up"]["p999_us"] = 10.9
@@ -95,7 +95,7 @@ class Gate(unittest.TestCase):
 
     def test_the_programs_own_comparison_counts_too(self):
         def late(files): files["latency.json"] = LATENCY | {"ours": LATENCY["ours"] | {"p999_us": 9.7, "missed": 2}}
-        self.refuses(late, "latency: 2 missed ticks, the last by ''; 0 allowed",
+        self.refuses(late, "latency: 2 missed ticks, {}; 0 allowed",
                      "latency: wake-up p999_us 9.7, cyclictest 8.0: more than 1.2 times as much")
 
     def test_results_that_are_not_there(self):

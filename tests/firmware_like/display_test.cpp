@@ -69,5 +69,7 @@ TEST_CASE("the status line holds still while nothing happens, and says what a pe
   CHECK(line == "Execute / ScanSurface, 14 boundary shots, 3 of 16 surface shots");
   p.now = 6s;
   CHECK(status_line(p) == line);
-  CHECK(status_line({.state = tasks::CellState::held, .why = "look at the plate"}) == "Held: look at the plate");
+  CHECK(status_line({.state = tasks::CellState::held, .why = "look at the plate"}) ==
+        "Held: look at the plate");
+  CHECK(status_line({.state = tasks::CellState::stopped, .why = "look at the plate"}) == "Stopped");
 }

@@ -80,6 +80,15 @@ long faults() {
   return faults() - before;
 }
 
+[[gnu::noinline]] long faults_of_an_allocation(std::size_t bytes) {
+  const long before = faults();
+  auto* block = static_cast<volatile char*>(std::malloc(bytes));
+  for (std::size_t i = 0; i < bytes; i += 4096) block[i] = 1;
+  const long met = faults() - before;
+  std::free(const_cast<char*>(block));
+  return met;
+}
+
 // Memory and threads that a program asks for later on.
 std::string grow() {
   std::vector<char> large(64 << 20, 1);
@@ -328,12 +337,11 @@ TEST_CASE(
     const ProcessSetup process{config, no_device};
     json j;
     ControlThread control{config, [&] {
+                            // Rehearsed small: the code itself comes from its file page by page.
+                            faults_of_a_deep_call(4096);
+                            faults_of_an_allocation(4096);
                             const long deep = faults_of_a_deep_call(1 << 20);
-                            const long before = faults();
-                            auto* block = static_cast<volatile char*>(std::malloc(7 << 20));
-                            for (std::size_t i = 0; i < 7 << 20; i += 4096) block[i] = 1;
-                            j = {deep, faults() - before};
-                            std::free(const_cast<char*>(block));
+                            j = {deep, faults_of_an_allocation(7 << 20)};
                           }};
     control.begin();
     control.join();
