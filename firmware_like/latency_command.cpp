@@ -177,17 +177,17 @@ std::expected<Measured, RunError> measure(LatencyLoad& load, RunFolder& folder, 
 
 Json busy_json(const LatencyLoad& load) {
   return {{"surfaces_solved", load.surfaces()},
-          {"points_folded", load.points_folded()},
+          {"points_seen", load.points_seen()},
           {"frames_recorded", load.frames()},
           {"frames_refused", load.frames_refused()},
           {"records_lost", load.recorder().lost()}};
 }
 
 std::string busy_line(const Json& busy) {
-  return fmt::format("busy with           {} surfaces of {} points, {} frames recorded, {} refused\n",
-                     busy["surfaces_solved"].get<std::uint64_t>(), busy["points_folded"].get<std::uint64_t>(),
-                     busy["frames_recorded"].get<std::uint64_t>(),
-                     busy["frames_refused"].get<std::uint64_t>());
+  return fmt::format(
+      "busy with           {} surfaces solved, {} points looked at, {} frames recorded, {} refused\n",
+      busy["surfaces_solved"].get<std::uint64_t>(), busy["points_seen"].get<std::uint64_t>(),
+      busy["frames_recorded"].get<std::uint64_t>(), busy["frames_refused"].get<std::uint64_t>());
 }
 
 std::expected<CellConfig, RunError> config_of(const LatencyOptions& options) {

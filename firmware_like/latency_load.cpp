@@ -23,6 +23,7 @@ constexpr double reach_mm = 18;       // of the hint, as the cell has it
 constexpr double reach_over_mm = 12;  // how far the outermost shots look over the plate's edge
 
 constexpr auto frame_period = 200ms;
+constexpr std::size_t points_a_tick = 2048;  // unpacked
 constexpr double link_bytes_per_s = 100e6 / 8;
 
 double height(double x, double y) {
@@ -47,8 +48,7 @@ std::size_t FrameWire::read(std::span<std::byte> out) noexcept {
 }
 
 LatencyLoad::LatencyLoad(const CellConfig& config, hal::Clock& clock)
-    : clock_{clock},
-      shots_{shots_of_a_plate(config)},
+    : shots_{shots_of_a_plate(config)},
       recorder_{recorder_sizes(config), &flight_},
       wire_{on_the_wire(config, shots_.front().frame)},
       link_{wire_, hal::LinkId::scanner, recorder_, clock},
@@ -131,6 +131,7 @@ std::vector<std::byte> LatencyLoad::on_the_wire(const CellConfig& config, const 
 }
 
 void LatencyLoad::receive(hal::Instant now) {
+  unpack();
   if (wire_.idle()) {
     if (now < next_frame_) return;
     next_frame_ = now + frame_period;
@@ -153,21 +154,35 @@ void LatencyLoad::receive(hal::Instant now) {
 }
 
 void LatencyLoad::frame_arrived(hal::Instant now) {
-  const std::size_t payload_bytes = message_.size() - header_size - payload_crc_size;
-  const auto payload = std::span<const std::byte>{message_}.subspan(header_size, payload_bytes);
   std::uint32_t crc = 0;
-  std::memcpy(&crc, payload.data() + payload.size(), sizeof crc);
-  if (crc != crc_ || !hal::psc1::decode_frame(payload, decoded_)) {
+  std::memcpy(&crc, payload().data() + payload().size(), sizeof crc);
+  const auto begun = hal::psc1::begin_frame(payload(), decoded_);
+  if (crc != crc_ || !begun) {
     ++damaged_;
     return;
   }
+  packed_ = *begun;
+  unpacked_ = 0;
   ++frames_;
+  const auto received = recorder_.offset(hal::LinkId::scanner, hal::Direction::received);
   recorder_.shot({.at = now,
                   .shot_id = static_cast<std::uint32_t>(frames_),
                   .purpose = hal::ShotPurpose::surface,
-                  .payload_offset = recorder_.offset(hal::LinkId::scanner, hal::Direction::received) -
-                                    payload_crc_size - payload.size(),
-                  .payload_bytes = static_cast<std::uint32_t>(payload.size())});
+                  .payload_offset = received - payload_crc_size - payload().size(),
+                  .payload_bytes = static_cast<std::uint32_t>(payload().size())});
+}
+
+// A frame's points in pieces, as the driver does it where nobody is in a hurry.
+void LatencyLoad::unpack() {
+  if (!packed_) return;
+  const std::size_t end = std::min<std::size_t>(unpacked_ + points_a_tick, packed_->point_count);
+  hal::psc1::decode_points(payload(), *packed_, unpacked_, end, decoded_);
+  unpacked_ = end;
+  if (unpacked_ == packed_->point_count) packed_.reset();
+}
+
+std::span<const std::byte> LatencyLoad::payload() const {
+  return std::span{message_}.subspan(header_size, message_.size() - header_size - payload_crc_size);
 }
 
 // One piece of the cell's part a tick; the pieces between are background work.
@@ -180,7 +195,6 @@ void LatencyLoad::measure(hal::Instant) {
       return sweep();
     case Stage::ready:
       ++surfaces_;
-      points_ += surface_.fit().report().points_used;
       return surface_.begin();
     default:
       return;
@@ -199,6 +213,7 @@ void LatencyLoad::walk_the_edge() {
 void LatencyLoad::sweep() {
   if (looked_at_ != nullptr && view_.found()) {
     surface_.fold(view_, looked_at_->world_from_scanner);
+    points_ += looked_at_->frame.point_count;
     looked_at_ = nullptr;
     return;
   }

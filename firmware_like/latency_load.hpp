@@ -10,6 +10,7 @@
 // Failure      failed() when the fit has given up: a defect of the program, since the plate is known to be good
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "firmware_like/config.hpp"
@@ -61,7 +62,7 @@ class LatencyLoad {
   std::uint64_t frames_refused() const { return refused_; }  // for want of room in the recorder
   std::uint64_t frames_damaged() const { return damaged_; }  // by their checksum or content
   std::uint64_t surfaces() const { return surfaces_; }       // solved
-  std::uint64_t points_folded() const { return points_; }
+  std::uint64_t points_seen() const { return points_; }
   bool failed() const { return surface_.stage() == tasks::SurfaceTask::Stage::failed; }
 
  private:
@@ -81,12 +82,13 @@ class LatencyLoad {
   static std::vector<std::byte> on_the_wire(const CellConfig&, const hal::Frame&);
   void receive(hal::Instant now) MOLDLOFT_NONBLOCKING;
   void frame_arrived(hal::Instant now) MOLDLOFT_NONBLOCKING;
+  void unpack() MOLDLOFT_NONBLOCKING;
+  std::span<const std::byte> payload() const MOLDLOFT_NONBLOCKING;  // of the message on its way or there
   void measure(hal::Instant now) MOLDLOFT_NONBLOCKING;
   void walk_the_edge() MOLDLOFT_NONBLOCKING;
   void sweep() MOLDLOFT_NONBLOCKING;
   bool look_at_next(bool at_the_edge_only) MOLDLOFT_NONBLOCKING;
 
-  hal::Clock& clock_;
   std::vector<Shot> shots_;
   std::vector<Eigen::Vector2d> edge_points_, corners_;
   hal::FlightRecorder flight_;
@@ -97,6 +99,8 @@ class LatencyLoad {
   hal::Frame decoded_;
   std::size_t bytes_a_tick_, received_ = 0;
   std::uint32_t crc_ = 0;
+  std::optional<hal::psc1::FrameHead> packed_;  // the frame that is being unpacked
+  std::size_t unpacked_ = 0;
   hal::Instant next_frame_{0};
   tasks::ShotView view_;
   tasks::SurfaceTask surface_;

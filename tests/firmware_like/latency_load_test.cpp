@@ -31,11 +31,11 @@ TEST_CASE("the load of the self-test measures its plate again and again, to the 
   std::uint64_t points_of_one = 0;
   while (load->surfaces() < 2 && clock.now() < 60s) {
     load->scheduler().run_tick();
-    if (load->surfaces() == 1 && points_of_one == 0) points_of_one = load->points_folded();
+    if (load->surfaces() == 1 && points_of_one == 0) points_of_one = load->points_seen();
   }
   REQUIRE_FALSE(load->failed());
   REQUIRE(load->surfaces() == 2);
-  CHECK(load->points_folded() == 2 * points_of_one);  // every plate like the first
+  CHECK(load->points_seen() == 2 * points_of_one);  // every plate like the first
   const auto& report = load->surface().fit().report();
   CHECK(report.sigma_mm == doctest::Approx(config.scanner.noise_mm).epsilon(0.05));
   // The plate covers 300 x 300 mm of what the 16 fields of 102 x 102 mm see twice over in places.
