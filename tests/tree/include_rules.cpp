@@ -31,7 +31,7 @@ const std::vector<Library> libraries = {
     {"Eigen/", {"geometry", "tasks", "firmware_like", "host_sim"}, false},
     {"asio", {"hal", "host_sim"}, true},
     {"libserialport.h", {"hal"}, true},
-    {"sanitizer/", {"hal"}, true},
+    {"sanitizer/", {"hal"}, false},
     {"sqlite3.h", {"hal"}, false},
     {"fmt/", {"hal", "tasks", "firmware_like", "host_sim"}, false},
     {"nlohmann/", {"firmware_like", "host_sim"}, false},
