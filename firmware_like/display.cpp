@@ -61,7 +61,8 @@ void DisplayThread::work() {
 }
 
 void DisplayThread::show(const tasks::CellProgress& p) {
-  if (!begun_ && p.state == tasks::CellState::execute) {
+  const bool begins = p.state == tasks::CellState::execute || p.state == tasks::CellState::held;
+  if (!begun_ && begins) {
     begun_ = true;
     fmt::print(stderr, "{}{}\n", terminal_ ? "\r\x1b[K" : "", head_);
   }

@@ -18,8 +18,8 @@ std::string status_line(const tasks::CellProgress&);
 
 class DisplayThread {
  public:
-  DisplayThread(const tasks::Cell&,
-                std::string head);  // `head` is printed once when the cell begins to measure
+  // `head` is printed once, when the cell begins to measure or to wait for an operator.
+  DisplayThread(const tasks::Cell&, std::string head);
   ~DisplayThread();
   DisplayThread(const DisplayThread&) = delete;
   DisplayThread& operator=(const DisplayThread&) = delete;
