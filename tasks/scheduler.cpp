@@ -155,7 +155,8 @@ bool Scheduler::step_background(std::size_t i, Instant& t, Instant limit, bool& 
     const Instant due = limit + settings_.guard;
     if (!starving || !may_force || t > due || t + record.spec.quantum > due + settings_.late_tolerance) {
       if (last_run_tick_[i] != ticks_) ++record.refused;
-      peak_[i][kind] = std::max(record.spec.quantum, peak_[i][kind] / 2);
+      if (peak_[i][kind] > record.spec.quantum)
+        peak_[i][kind] = std::max(record.spec.quantum, peak_[i][kind] / 2);
       return false;
     }
     may_force = false;
