@@ -219,7 +219,7 @@ TEST_CASE("the table fits a terminal of a hundred columns and tells everything")
         "missed ticks        3 of 1997: woken late 0, preempted 0, computing 3");
   CHECK(numbered(table, "      0.703").find("     3  computing") != std::string::npos);
   CHECK(numbered(table, "frame to command") == "frame to command    not measured");
-  CHECK(numbered(table, "  health").find("20 ") != std::string::npos);
+  CHECK(numbered(table, "  health").find(" 19 ") != std::string::npos);
   CHECK(numbered(table, "control thread") ==
         "control thread      5 page faults, 3 times preempted, 1 moves to another processor, in 1990 ticks");
   CHECK(numbered(table, "representative").starts_with("representative      NO: "));
