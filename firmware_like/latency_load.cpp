@@ -195,7 +195,8 @@ void LatencyLoad::measure(hal::Instant) {
       return sweep();
     case Stage::ready:
       ++surfaces_;
-      return surface_.begin();
+      surface_.begin();
+      return walk_the_edge();
     default:
       return;
   }

@@ -69,14 +69,24 @@ std::string missed(const Json& t) {
 }
 
 std::string first_misses(const Json& t) {
-  std::string s;
+  if (t.at("first_misses").empty()) return "";
+  constexpr auto columns = "{:>11}{:>6}  {:<11}{:>11}{:>12}{:>14}{}\n";
+  std::string s = fmt::format(columns, "at, s", "lost", "cause", "late, us", "took, us", "computed, us",
+                              "  longest task");
   for (const auto& m : t.at("first_misses"))
-    s += fmt::format(
-        "  at {:>9.3f} s  lost {:<3} {:<11} {:>7} us late, tick took {} us, {} of it computing{}\n",
-        m.at("t_ms").get<double>() / 1000, number(m, "lost"), text(m, "cause"), figure(m.at("late_us")),
-        figure(m.at("tick_took_us")), figure(m.at("of_that_on_the_processor_us")),
-        text(m, "task") == "none" ? "" : ": " + text(m, "task"));
+    s += fmt::format(columns, fmt::format("{:.3f}", m.at("t_ms").get<double>() / 1000), number(m, "lost"),
+                     text(m, "cause"), figure(m.at("late_us")), figure(m.at("tick_took_us")),
+                     figure(m.at("of_that_on_the_processor_us")),
+                     text(m, "task") == "none" ? "" : "  " + text(m, "task"));
   return s;
+}
+
+// Parts that are separated by "; " begin lines of their own below the first, so that the terminal breaks none.
+std::string in_lines(std::string value, int indent) {
+  const std::string separator = ";\n" + std::string(static_cast<std::size_t>(indent), ' ');
+  for (auto at = value.find("; "); at != value.npos; at = value.find("; ", at + separator.size()))
+    value.replace(at, 2, separator);
+  return value;
 }
 
 std::string load(const Json& t) {
@@ -120,7 +130,7 @@ std::string budgets(const Json& t) {
                    figure(b.at("busiest_tick_us")), figure(b.at("busiest_tick_suggested_us")),
                    figure(t.at("tick_us")), figure(b.at("guard_us")),
                    b.at("suggested_fits_the_tick").get<bool>() ? "" : ": the suggested DO NOT FIT");
-  return s + "  suggested: " + text(b, "rule") + "\n";
+  return s + "  suggested: " + in_lines(text(b, "rule"), 13) + "\n";
 }
 
 std::string line(std::string_view name, int width, const std::string& value) {
@@ -159,7 +169,7 @@ std::string comparison(const Json& t) {
 std::string timing_table(const Json& t) {
   return comparison(t) + histograms(t) + "\n" + line("missed ticks", name_width, missed(t)) +
          first_misses(t) + line("load", name_width, load(t)) + system_counts(t) + "\n" + task_counts(t) +
-         "\n" + budgets(t) + "\n" + line("representative", name_width, verdict(t));
+         "\n" + budgets(t) + "\n" + line("representative", name_width, in_lines(verdict(t), name_width));
 }
 
 std::string timing_lines(const Json& t) {
