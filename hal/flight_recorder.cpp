@@ -11,6 +11,8 @@
 namespace moldloft::hal {
 namespace {
 
+constexpr std::uint32_t kept_for_others = 2;  // dumps that overruns and missed ticks leave
+
 template <std::size_t size>
 void put_text(std::array<char, size>& to, std::string_view text) noexcept {
   const std::size_t count = std::min(text.size(), size);
@@ -44,6 +46,7 @@ FlightRecorder::FlightRecorder(const Sizes& sizes)
       transitions_(sizes.transitions),
       mask_{sizes.events - 1},
       ticks_after_{sizes.ticks_after},
+      quiet_{sizes.quiet},
       dumps_left_{sizes.dumps} {
   assert(std::has_single_bit(sizes.events) && sizes.transitions > 0);
 }
@@ -79,11 +82,13 @@ void FlightRecorder::transition(const EventRecord& event) noexcept {
 }
 
 void FlightRecorder::trigger(FlightCause cause, int task, Instant at) noexcept {
-  if (due()) {
+  const bool is_timing = cause == FlightCause::overrun || cause == FlightCause::missed_tick;
+  if (due() || (is_timing && at < quiet_until_)) {
     ++later_triggers_;
     return;
   }
-  if (dumps_left() == 0) return;
+  if (dumps_left() <= (is_timing ? kept_for_others : 0)) return;
+  if (is_timing) quiet_until_ = at + quiet_;
   header_.cause = cause;
   header_.task = static_cast<std::uint8_t>(task);
   header_.triggered_ns = at.count();

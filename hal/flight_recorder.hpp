@@ -7,8 +7,8 @@
 // Blocking     never, but dump() writes to a file
 // Allocation   in the constructor only
 // Cost         note() about 3 ns: 16 bytes into a ring
-// Failure      a trigger while another is being dumped is counted in later_triggers() and otherwise ignored; after
-//              `dumps` dumps triggers are ignored, so that a sick machine does not fill its disk
+// Failure      a trigger while another is being dumped, or too soon after it, is counted in later_triggers() and
+//              otherwise ignored; after `dumps` dumps triggers are ignored, so that a sick machine does not fill its disk
 #pragma once
 
 #include <array>
@@ -28,7 +28,9 @@ class FlightRecorder {
         1u << 14;  // a power of two; 16 bytes each. A quiet tick takes ten, a busy one twenty
     std::size_t transitions = 64;
     std::uint32_t ticks_after = 20;  // from the trigger to the freeze
-    std::uint32_t dumps = 8;         // of one run
+    std::uint32_t dumps = 8;         // of one run; the last two are kept for aborts and requests
+    // Between two overruns or missed ticks that are dumped: a sick machine must not spend all dumps on its first second.
+    Duration quiet = std::chrono::seconds{2};
   };
 
   FlightRecorder() : FlightRecorder{Sizes{}} {}
@@ -83,6 +85,8 @@ class FlightRecorder {
   std::uint64_t transitions_written_ = 0;
   std::uint32_t ticks_after_, ticks_to_freeze_ = 0;
   std::uint64_t later_triggers_ = 0, tick_number_ = 0;
+  Duration quiet_;
+  Instant quiet_until_{0};
   FlightHeader header_{};
   std::atomic<State> state_{State::running};
   std::atomic<bool> requested_{false};

@@ -87,7 +87,7 @@ TEST_CASE("the ring keeps the last events, each exactly once and in order") {
 }
 
 TEST_CASE("a trigger freezes the ring after the ticks that show what came of it") {
-  FlightRecorder flight{{.events = 64, .transitions = 4, .ticks_after = 3, .dumps = 2}};
+  FlightRecorder flight{{.events = 64, .transitions = 4, .ticks_after = 3, .dumps = 4}};
   std::uint64_t number = 41;
   const auto tick = [&] { flight.tick(std::chrono::milliseconds{number}, 1us, number), ++number; };
   tick();
@@ -115,18 +115,38 @@ TEST_CASE("a trigger freezes the ring after the ticks that show what came of it"
 TEST_CASE("while one trigger is worked on others only count, and after the last dump none does anything") {
   FlightRecorder flight{{.events = 64, .transitions = 4, .ticks_after = 0, .dumps = 2}};
   for (int dump = 0; dump < 2; ++dump) {
-    flight.trigger(FlightCause::missed_tick, 1, 1ms);
+    flight.trigger(FlightCause::abort, 1, 1ms);
     flight.trigger(FlightCause::overrun, 3, 2ms);
     flight.tick(3ms, 0us, 3);
     CHECK(flight.frozen());
-    CHECK(dumped(flight).header.cause == FlightCause::missed_tick);  // the first one stands
+    CHECK(dumped(flight).header.cause == FlightCause::abort);  // the first one stands
     CHECK(dumped(flight).header.task == 1);
     flight.thaw();
   }
   CHECK(flight.later_triggers() == 2);
   CHECK(flight.dumps_left() == 0);
-  flight.trigger(FlightCause::missed_tick, 1, 5ms);
+  flight.trigger(FlightCause::abort, 1, 5ms);
   CHECK_FALSE(flight.due());
+}
+
+TEST_CASE("overruns and missed ticks are dumped once in a while, and leave two dumps for what is worse") {
+  FlightRecorder flight{{.events = 64, .transitions = 4, .ticks_after = 0, .dumps = 4, .quiet = 2s}};
+  const auto dumps_at = [&](Instant at, FlightCause cause) {
+    flight.trigger(cause, 0, at);
+    flight.tick(at, 0us, 0);
+    const bool frozen = flight.frozen();
+    if (frozen) flight.thaw();
+    return frozen;
+  };
+  CHECK(dumps_at(1s, FlightCause::overrun));
+  CHECK_FALSE(dumps_at(2s, FlightCause::missed_tick));
+  CHECK_FALSE(dumps_at(3s - 1ns, FlightCause::overrun));
+  CHECK(dumps_at(3s, FlightCause::missed_tick));
+  CHECK(flight.later_triggers() == 2);
+  CHECK_FALSE(dumps_at(9s, FlightCause::missed_tick));  // two are left
+  CHECK(dumps_at(9s, FlightCause::request));
+  CHECK(dumps_at(9s, FlightCause::abort));
+  CHECK(flight.dumps_left() == 0);
 }
 
 TEST_CASE("a request from another thread triggers at the next tick") {

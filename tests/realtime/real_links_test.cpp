@@ -76,5 +76,5 @@ TEST_CASE("a run that breaks the promise once, in its middle, is seen to") {
   one("malloc", "malloc");
   one("lock", "pthread_mutex_lock");
   // The guard does not see a page fault, nor need it: the run's own count does.
-  if (memory_can_be_locked()) CHECK(faults(guarded_run("fault").counts) == 8);
+  if (memory_can_be_locked()) CHECK(faults(guarded_run("fault").counts) >= 8);
 }
