@@ -59,8 +59,8 @@ TEST_CASE("a complete run on real links neither allocates nor locks nor waits in
   CHECK(ticks > 10'000);
   CHECK(run.report["sleeps"].get<int>() == ticks);
   CHECK(run.report["asked"].get<int>() > ticks);
-  // Whoever waits gives the CPU away. That happened at the sleeps, and rarely inside the kernel, where a pseudo-terminal
-  // has locks of its own: whatever waits at every tick would double the count.
+  // Whoever waits gives the CPU away. That happened at the sleeps, and rarely inside the kernel, where a
+  // pseudo-terminal has locks of its own: whatever waits at every tick would double the count.
   CHECK(run.counts["voluntary_switches"].get<int>() <= ticks + ticks / 100);
   CHECK(run.counts["suspensions"] == 0);
   // Every page was there when it was needed.

@@ -197,8 +197,8 @@ TEST_CASE("steps of a kind that costs alike fill the slack by what they were mea
   scheduler.add_background({.name = "look", .quantum = 200us}, look);
   scheduler.start();
   scheduler.run_tick();
-  // The first is counted as the quantum; then the peak comes down by 1/128 of the rest a run. The last start of the tick
-  // is the largest n with 10 n + 10 + 190 (127/128)^n <= 900.
+  // The first is counted as the quantum; then the peak comes down by 1/128 of the rest a run. The last start of the
+  // tick is the largest n with 10 n + 10 + 190 (127/128)^n <= 900.
   REQUIRE(look.starts.size() == 79);
   CHECK(look.starts[1] == 10us);
   for (int i = 0; i < 20; ++i) scheduler.run_tick();
