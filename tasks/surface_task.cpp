@@ -51,6 +51,7 @@ void SurfaceTask::step_keep() {
 void SurfaceTask::build_outline(std::span<const Eigen::Vector2d> edges,
                                 std::span<const Eigen::Vector2d> corner_candidates) {
   edges_ = edges;
+  map_row_ = -1;
   corners_.begin(edges, corner_candidates);
   stage_ = Stage::choosing_corners;
 }
@@ -108,11 +109,19 @@ void SurfaceTask::step_corners() {
 }
 
 void SurfaceTask::step_outline() {
-  const auto done = outline_.step();
-  if (!done) return fail(done.error());
-  if (!*done) return;
-  map_.assign(outline_.outline());
-  if (const auto good = map_.check(); !good) return fail(good.error());
+  if (map_row_ < 0) {
+    const auto done = outline_.step();
+    if (!done) return fail(done.error());
+    if (!*done) return;
+    map_.assign(outline_.outline());
+    map_row_ = 0;
+    return;
+  }
+  constexpr int rows_a_step = 3;
+  for (int i = 0; i < rows_a_step && map_row_ < geometry::PlanMap::check_rows; ++i, ++map_row_) {
+    if (const auto good = map_.check_row(map_row_); !good) return fail(good.error());
+  }
+  if (map_row_ < geometry::PlanMap::check_rows) return;
   fit_.begin(map_);
   stage_ = Stage::folding_reserve;
 }

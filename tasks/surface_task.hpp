@@ -115,6 +115,7 @@ class SurfaceTask final : public BackgroundTask {
   ShotView* looking_at_ = nullptr;
   ShotView* keeping_from_ = nullptr;
   std::size_t keep_end_ = 0;  // of the reserve, for the shot at hand
+  int map_row_ = -1;          // of the plan map's check; -1: the outline is not there yet
   geometry::RigidMotion world_from_scanner_;
   int shots_ = 0;
 };

@@ -14,7 +14,8 @@ namespace moldloft::geometry {
 
 namespace {
 
-constexpr double tangent_stretch_mm = 30;   // long enough for 0.1 degrees, short against the bend of a side
+constexpr double tangent_stretch_mm = 30;  // long enough for 0.1 degrees, short against the bend of a side
+constexpr std::size_t points_a_step = 32;
 constexpr std::size_t bridged_stripes = 2;  // stripes without an edge point that do not cut a piece
 constexpr double shortest_run_mm =
     3.5;  // a tip's last stripes are too short to count as runs (plate_runs.hpp)
@@ -165,21 +166,22 @@ void BoundaryViewer::take_stretch() {
   std::copy(ring_.begin() + from, ring_.begin() + to, std::back_inserter(points_));
 }
 
-// Once over the stretch. Judged against the unchanged points, dropped afterwards.
-void BoundaryViewer::drop_false_points(std::size_t begin, std::size_t& end) {
-  const auto piece = std::span<const EdgePoint>(points_).subspan(begin, end - begin);
-  std::size_t kept = begin;
-  constexpr std::size_t lag = 6;  // a point may be overwritten once no later point is judged by it
-  std::array<bool, lag> verdicts{};
-  for (std::size_t i = 0; i < piece.size() + lag; ++i) {
-    if (i >= lag) {
-      const std::size_t settled = i - lag;
-      const bool keep = !verdicts[settled % lag];
-      if (keep) points_[kept++] = points_[begin + settled];
+// Some points of one pass over the stretch; true when the pass is done. Judged against the unchanged points, dropped
+// afterwards.
+bool BoundaryViewer::drop_false_points() {
+  const auto piece = std::span<const EdgePoint>(points_).subspan(stretch_begin_);
+  const std::size_t end = piece.size() + drop_lag;
+  for (std::size_t left = points_a_step; left > 0 && drop_at_ < end; --left, ++drop_at_) {
+    if (drop_at_ >= drop_lag) {
+      const std::size_t settled = drop_at_ - drop_lag;
+      const bool keep = !verdicts_[settled % drop_lag];
+      if (keep) points_[stretch_begin_ + drop_kept_++] = points_[stretch_begin_ + settled];
     }
-    if (i < piece.size()) verdicts[i % lag] = is_false_point(piece, i);
+    if (drop_at_ < piece.size()) verdicts_[drop_at_ % drop_lag] = is_false_point(piece, drop_at_);
   }
-  end = kept;
+  if (drop_at_ < end) return false;
+  points_.resize(stretch_begin_ + drop_kept_);
+  return true;
 }
 
 namespace {
@@ -241,44 +243,50 @@ std::size_t corner_within(std::span<const EdgePoint> part, std::size_t least,
 
 }  // namespace
 
-BoundaryViewer::Cuts BoundaryViewer::find_corners(std::span<const EdgePoint> all, std::size_t begin,
-                                                  std::size_t end, const BoundaryViewSettings& settings) {
-  Cuts cuts{.at = {begin, end}};
-  auto& at = cuts.at;
-  for (std::size_t k = 0; k + 1 < cuts.count && cuts.count < at.size();) {
-    const std::size_t split =
-        corner_within(all.subspan(at[k], at[k + 1] - at[k]), settings.min_side_points, settings);
-    if (split == 0) {
-      ++k;
-      continue;
-    }
-    std::copy_backward(at.begin() + k + 1, at.begin() + cuts.count, at.begin() + cuts.count + 1);
-    at[k + 1] = at[k] + split;
-    ++cuts.count;
-  }
-  // The first splits were found before the others were known: place each again between its neighbours, then
-  // ask once more whether it is a corner.
-  for (int pass = 0; pass < 2; ++pass) {
-    for (std::size_t k = 1; k + 1 < cuts.count;) {
-      const auto between = all.subspan(at[k - 1], at[k + 1] - at[k - 1]);
-      const std::size_t split = corner_within(between, settings.min_side_points, settings);
-      if (split != 0) {
-        at[k] = at[k - 1] + split;
-        ++k;
-      } else {
-        std::copy(at.begin() + k + 1, at.begin() + cuts.count, at.begin() + k);
-        --cuts.count;
+// One look at one part of the stretch; true when all corners are found. The first splits are found before the others
+// are known: each is placed again between its neighbours, twice, and asked once more whether it is a corner.
+bool BoundaryViewer::find_corners() {
+  const std::span<const EdgePoint> all(points_);
+  auto& at = cuts_.at;
+  const auto cut = at.begin() + static_cast<std::ptrdiff_t>(cut_),
+             end = at.begin() + static_cast<std::ptrdiff_t>(cuts_.count);
+  if (cut_passes_ == 0) {
+    if (cut_ + 1 < cuts_.count && cuts_.count < at.size()) {
+      const std::size_t split =
+          corner_within(all.subspan(at[cut_], at[cut_ + 1] - at[cut_]), settings_.min_side_points, settings_);
+      if (split == 0) {
+        ++cut_;
+        return false;
       }
+      std::copy_backward(cut + 1, end, end + 1);
+      at[cut_ + 1] = at[cut_] + split;
+      ++cuts_.count;
+      return false;
     }
+    cut_passes_ = 1, cut_ = 1;
+    return false;
   }
-  return cuts;
+  if (cut_ + 1 < cuts_.count) {
+    const auto between = all.subspan(at[cut_ - 1], at[cut_ + 1] - at[cut_ - 1]);
+    const std::size_t split = corner_within(between, settings_.min_side_points, settings_);
+    if (split != 0) {
+      at[cut_] = at[cut_ - 1] + split;
+      ++cut_;
+    } else {
+      std::copy(cut + 1, end, cut);
+      --cuts_.count;
+    }
+    return false;
+  }
+  cut_ = 1;
+  return ++cut_passes_ > 2;
 }
 
 // A stub of two or three points beyond a corner has no tangent: the side ends at the corner, and unless the
 // stub leads out of the field, the rest of the boundary hides between stripes. Says whether it hides at the
 // last, or first, end.
-bool BoundaryViewer::trim_last(std::span<const EdgePoint> all, Cuts& cuts,
-                               const BoundaryViewSettings& settings) {
+bool BoundaryViewer::trim_last(std::span<const EdgePoint> all, Cuts& cuts) const {
+  const BoundaryViewSettings& settings = settings_;
   const std::size_t from = cuts.at[cuts.count - 2], end = cuts.at[cuts.count - 1];
   const std::size_t split = corner_within(all.subspan(from, end - from), 2, settings);
   if (split == 0 || end - from - split >= settings.min_side_points) {
@@ -288,8 +296,8 @@ bool BoundaryViewer::trim_last(std::span<const EdgePoint> all, Cuts& cuts,
   return stub_hides(all[end - 1], all[end - 2], settings);
 }
 
-bool BoundaryViewer::trim_first(std::span<const EdgePoint> all, Cuts& cuts,
-                                const BoundaryViewSettings& settings) {
+bool BoundaryViewer::trim_first(std::span<const EdgePoint> all, Cuts& cuts) const {
+  const BoundaryViewSettings& settings = settings_;
   const std::size_t begin = cuts.at[0], to = cuts.at[1];
   const std::size_t split = corner_within(all.subspan(begin, to - begin), 2, settings);
   if (split == 0 || split >= settings.min_side_points) {
@@ -300,12 +308,8 @@ bool BoundaryViewer::trim_first(std::span<const EdgePoint> all, Cuts& cuts,
 }
 
 // Cuts one stretch half-way between its corners and describes every part.
-void BoundaryViewer::describe(Cuts cuts, bool hidden_first, bool hidden_last,
+void BoundaryViewer::describe(const Cuts& cuts, bool hidden_first, bool hidden_last,
                               const BoundaryViewSettings& settings) {
-  const std::span<const EdgePoint> all(points_);
-  hidden_last |= trim_last(all, cuts, settings);
-  hidden_first |= trim_first(all, cuts, settings);
-
   BoundaryPiece piece;
   piece.hidden_first = hidden_first, piece.hidden_last = hidden_last;
   const std::size_t count = cuts.count;
@@ -382,31 +386,39 @@ bool BoundaryViewer::step() {
         return true;
       }
       take_stretch();
-      drops_done_ = 0;
+      drops_done_ = 0, drop_at_ = drop_kept_ = 0;
       stage_ = Stage::drop;
       return false;
     case Stage::drop: {
-      std::size_t end = points_.size();
-      drop_false_points(stretch_begin_, end);
-      points_.resize(end);
+      if (!drop_false_points()) return false;
+      drop_at_ = drop_kept_ = 0;
       // Twice, since one false point beside another can hide it.
       if (++drops_done_ < 2) return false;
       const bool enough = points_.size() - stretch_begin_ >= settings_.min_side_points;
       stage_ = enough ? Stage::find_corners : Stage::take;
       if (!enough) ++next_break_;
+      cuts_ = {.at = {stretch_begin_, points_.size()}};
+      cut_passes_ = 0, cut_ = 0;
       return false;
     }
     case Stage::find_corners:
-      cuts_ = find_corners(points_, stretch_begin_, points_.size(), settings_);
+      if (find_corners()) stage_ = Stage::trim_last;
+      return false;
+    case Stage::trim_last:
+      hidden_last_ = breaks_[(next_break_ + 1) % breaks_.size()].ends_hidden;
+      hidden_last_ |= trim_last(points_, cuts_);
+      stage_ = Stage::trim_first;
+      return false;
+    case Stage::trim_first:
+      hidden_first_ = breaks_[next_break_].starts_hidden;
+      hidden_first_ |= trim_first(points_, cuts_);
       stage_ = Stage::describe;
       return false;
-    case Stage::describe: {
-      const Break& next = breaks_[(next_break_ + 1) % breaks_.size()];
-      describe(cuts_, breaks_[next_break_].starts_hidden, next.ends_hidden, settings_);
+    case Stage::describe:
+      describe(cuts_, hidden_first_, hidden_last_, settings_);
       ++next_break_;
       stage_ = Stage::take;
       return false;
-    }
     case Stage::done:
       return true;
   }

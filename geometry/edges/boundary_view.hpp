@@ -89,18 +89,17 @@ class BoundaryViewer {
     std::array<std::size_t, max_corners + 2> at{};
     std::size_t count = 2;
   };
-  enum class Stage : std::uint8_t { take, drop, find_corners, describe, done };
+  enum class Stage : std::uint8_t { take, drop, find_corners, trim_last, trim_first, describe, done };
 
   void collect_ends(std::span<const PlateRun> runs);
   void walk_ring(View&, std::size_t stripe_count, const BoundaryViewSettings&);
   void open_ring();
   void take_stretch();
-  void drop_false_points(std::size_t begin, std::size_t& end);
-  static Cuts find_corners(std::span<const EdgePoint> all, std::size_t begin, std::size_t end,
-                           const BoundaryViewSettings&);
-  static bool trim_last(std::span<const EdgePoint> all, Cuts&, const BoundaryViewSettings&);
-  static bool trim_first(std::span<const EdgePoint> all, Cuts&, const BoundaryViewSettings&);
-  void describe(Cuts, bool hidden_first, bool hidden_last, const BoundaryViewSettings&);
+  bool drop_false_points();
+  bool find_corners();
+  bool trim_last(std::span<const EdgePoint> all, Cuts&) const;
+  bool trim_first(std::span<const EdgePoint> all, Cuts&) const;
+  void describe(const Cuts&, bool hidden_first, bool hidden_last, const BoundaryViewSettings&);
   void finish();
   void describe_side(std::size_t begin, std::size_t end, BoundaryPiece, const BoundaryViewSettings&);
   void describe_corner(std::size_t begin, std::size_t split, std::size_t end, BoundaryPiece,
@@ -114,7 +113,13 @@ class BoundaryViewer {
   View view_;
   std::size_t stripe_count_ = 0, ring_start_ = 0, next_break_ = 0;
   std::size_t stretch_begin_ = 0;
-  int drops_done_ = 0;
+  // How far a pass over the stretch has come: dropping, and the search for corners.
+  static constexpr std::size_t drop_lag =
+      6;  // a point may be overwritten once no later point is judged by it
+  std::array<bool, drop_lag> verdicts_{};
+  std::size_t drop_at_ = 0, drop_kept_ = 0, cut_ = 0;
+  int drops_done_ = 0, cut_passes_ = 0;
+  bool hidden_first_ = false, hidden_last_ = false;
   Cuts cuts_;
   Stage stage_ = Stage::done;
 };

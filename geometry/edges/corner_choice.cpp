@@ -87,7 +87,7 @@ void CornerChoice::begin(std::span<const Vector2d> edges, std::span<const Vector
   edges_ = edges;
   candidates_ = candidates.first(std::min(candidates.size(), settings_.max_candidates));
   chosen_.clear();
-  next_ = 0;
+  next_ = 0, round_ = 0;
   checked_ = false;
 }
 
@@ -101,7 +101,11 @@ std::expected<bool, Error> CornerChoice::step() {
     return false;
   }
   if (next_ < candidates_.size()) {
-    if (const auto corner = examine(candidates_[next_++])) keep(*corner);
+    if (round_ == 0) examined_ = {.position = candidates_[next_]};
+    const bool is_corner = examine(candidates_[next_]);
+    if (is_corner && ++round_ < rounds) return false;
+    if (is_corner) keep(examined_);
+    round_ = 0, ++next_;
     return false;
   }
   if (const auto arranged = arrange(); !arranged) return std::unexpected(arranged.error());
@@ -118,28 +122,24 @@ void CornerChoice::gather(const Vector2d& about) {
   }
 }
 
-std::optional<CornerChoice::Corner> CornerChoice::examine(const Vector2d& candidate) {
-  Corner corner{.position = candidate};
-  for (int round = 0; round < rounds; ++round) {
-    gather(corner.position);
-    if (ring_.size() < 2 * fewest_points) return std::nullopt;
-    const Vector2d about = corner.position;
-    const Branches two = branches(ring_, about);
-    const auto nearer_a = [&](const Vector2d& p) { return (p - about).dot(two.a) >= (p - about).dot(two.b); };
-    const Line a = fit(ring_, nearer_a);
-    const Line b = fit(ring_, [&](const Vector2d& p) { return !nearer_a(p); });
-    if (a.count < fewest_points || b.count < fewest_points) return std::nullopt;
-    const Vector2d to_a = a.direction.dot(two.a) > 0 ? a.direction : Vector2d{-a.direction};
-    const Vector2d to_b = b.direction.dot(two.b) > 0 ? b.direction : Vector2d{-b.direction};
-    corner.turn = std::numbers::pi - std::acos(std::clamp(to_a.dot(to_b), -1.0, 1.0));
-    corner.rms_mm = std::hypot(a.rms, b.rms);
-    if (corner.turn < settings_.min_turn) return std::nullopt;
-    corner.position =
-        a.mean + cross(b.mean - a.mean, b.direction) / cross(a.direction, b.direction) * a.direction;
-    if (!corner.position.allFinite() || (corner.position - candidate).norm() > settings_.ring_outer_mm)
-      return std::nullopt;
-  }
-  return corner;
+// One round of the candidate at hand; false when it is no corner.
+bool CornerChoice::examine(const Vector2d& candidate) {
+  gather(examined_.position);
+  if (ring_.size() < 2 * fewest_points) return false;
+  const Vector2d about = examined_.position;
+  const Branches two = branches(ring_, about);
+  const auto nearer_a = [&](const Vector2d& p) { return (p - about).dot(two.a) >= (p - about).dot(two.b); };
+  const Line a = fit(ring_, nearer_a);
+  const Line b = fit(ring_, [&](const Vector2d& p) { return !nearer_a(p); });
+  if (a.count < fewest_points || b.count < fewest_points) return false;
+  const Vector2d to_a = a.direction.dot(two.a) > 0 ? a.direction : Vector2d{-a.direction};
+  const Vector2d to_b = b.direction.dot(two.b) > 0 ? b.direction : Vector2d{-b.direction};
+  examined_.turn = std::numbers::pi - std::acos(std::clamp(to_a.dot(to_b), -1.0, 1.0));
+  examined_.rms_mm = std::hypot(a.rms, b.rms);
+  if (examined_.turn < settings_.min_turn) return false;
+  examined_.position =
+      a.mean + cross(b.mean - a.mean, b.direction) / cross(a.direction, b.direction) * a.direction;
+  return examined_.position.allFinite() && (examined_.position - candidate).norm() <= settings_.ring_outer_mm;
 }
 
 // Of corners that lie together the one whose branches are straightest is kept.

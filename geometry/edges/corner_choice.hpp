@@ -50,7 +50,7 @@ class CornerChoice {
     Eigen::Vector2d position;
     double turn = 0, rms_mm = 0;
   };
-  std::optional<Corner> examine(const Eigen::Vector2d& candidate);
+  bool examine(const Eigen::Vector2d& candidate);
   void gather(const Eigen::Vector2d& about);
   void keep(const Corner&);
   std::expected<void, Error> arrange();
@@ -61,6 +61,8 @@ class CornerChoice {
   std::vector<Corner> chosen_;
   std::array<Eigen::Vector2d, 4> corners_;
   std::size_t next_ = 0;
+  int round_ = 0;  // of the candidate at hand
+  Corner examined_;
   bool checked_ = false;
 };
 

@@ -116,21 +116,28 @@ PlanPoint PlanMap::at(double u, double v) const {
 }
 
 std::expected<void, Error> PlanMap::check() const {
-  // A corner of 180 degrees has no Jacobian, and rounding would decide its sign.
-  for (const Eigen::Vector2d& corner : {Eigen::Vector2d(0, 0), {1, 0}, {1, 1}, {0, 1}}) {
-    const Eigen::Matrix2d jacobian = at(corner.x(), corner.y()).jacobian;
-    const double largest = jacobian.col(0).norm() * jacobian.col(1).norm();
-    if (!std::isfinite(largest)) return std::unexpected(Error::not_finite);
-    if (std::abs(jacobian.determinant()) <= least_corner_sine * largest)
-      return std::unexpected(Error::collinear);
+  for (int row = 0; row < check_rows; ++row) {
+    if (const auto good = check_row(row); !good) return good;
   }
-  constexpr int grid = 64;
-  for (int i = 0; i <= grid; ++i) {
-    for (int j = 0; j <= grid; ++j) {
-      const double area = at(i / double{grid}, j / double{grid}).jacobian.determinant();
-      if (!std::isfinite(area)) return std::unexpected(Error::not_finite);
-      if (area <= 0) return std::unexpected(Error::folded_map);
+  return {};
+}
+
+std::expected<void, Error> PlanMap::check_row(int row) const {
+  if (row == 0) {
+    // A corner of 180 degrees has no Jacobian, and rounding would decide its sign.
+    for (const Eigen::Vector2d& corner : {Eigen::Vector2d(0, 0), {1, 0}, {1, 1}, {0, 1}}) {
+      const Eigen::Matrix2d jacobian = at(corner.x(), corner.y()).jacobian;
+      const double largest = jacobian.col(0).norm() * jacobian.col(1).norm();
+      if (!std::isfinite(largest)) return std::unexpected(Error::not_finite);
+      if (std::abs(jacobian.determinant()) <= least_corner_sine * largest)
+        return std::unexpected(Error::collinear);
     }
+  }
+  constexpr int grid = check_rows - 1;
+  for (int j = 0; j <= grid; ++j) {
+    const double area = at(row / double{grid}, j / double{grid}).jacobian.determinant();
+    if (!std::isfinite(area)) return std::unexpected(Error::not_finite);
+    if (area <= 0) return std::unexpected(Error::folded_map);
   }
   return {};
 }

@@ -43,6 +43,9 @@ class PlanMap {
   PlanPoint at(double u, double v) const;
   std::expected<void, Error> check() const
       MOLDLOFT_GEOMETRY_NONBLOCKING;  // Jacobian positive on a 65 x 65 grid
+  // The same in pieces: rows 0 to check_rows - 1, 10 us each.
+  static constexpr int check_rows = 65;
+  std::expected<void, Error> check_row(int row) const MOLDLOFT_GEOMETRY_NONBLOCKING;
   // (u, v) of a plan position, starting from `guess`; outside [0, 1]^2 by at most `margin` it is still given.
   std::expected<Eigen::Vector2d, Error> invert(const Eigen::Vector2d& xy, const Eigen::Vector2d& guess,
                                                double margin = 0.0) const;
