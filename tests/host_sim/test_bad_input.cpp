@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "firmware_like/run_command.hpp"
+#include "firmware_like/task_table.hpp"
 #include "host_sim/child_process.hpp"
 
 using namespace moldloft;
@@ -191,11 +192,12 @@ TEST_CASE("a latency self-test that cannot be is refused in one line before anyt
     check_refused(run_program(words), "moldloft latency: " + line);
     CHECK_FALSE(fs::exists(out));
   };
+  const std::string shortest = std::to_string(firmware_like::shortest_tick / 1us);
   refuses({"--duration", "0"}, "--duration: 0 s given; from 1 to 2592000 s");
   refuses({"--duration", "nan"}, "--duration: nan s given; from 1 to 2592000 s");
   refuses({"--compare", "latencytest"}, "--compare: 'latencytest' given; it knows cyclictest");
-  refuses({"--tick", "500"}, "--tick: 500 us given; from 771 to 100000 us");
-  refuses({"--tick", "-1"}, "--tick: -1 us given; from 771 to 100000 us");
+  refuses({"--tick", "500"}, "--tick: 500 us given; from " + shortest + " to 100000 us");
+  refuses({"--tick", "-1"}, "--tick: -1 us given; from " + shortest + " to 100000 us");
   refuses({"--config", bench.path("none.toml")},
           bench.path("none.toml") + ": cannot be read; give the path of a cell configuration");
   const std::string held = bench.write("held", "a file");
