@@ -190,9 +190,12 @@ bool Scheduler::count_missed(Instant t) {
   }
   const auto lost =
       static_cast<std::uint64_t>((t - next_tick_ - settings_.late_tolerance - 1ns) / settings_.tick) + 1;
-  keep_miss(t, lost);
-  missed_ += lost;
-  ++misses_in_a_row_;
+  // The first ticks open links and touch pages: what they cost is no fault of the run.
+  if (warm()) {
+    keep_miss(t, lost);
+    missed_ += lost;
+    ++misses_in_a_row_;
+  }
   // Made up for at once, the last of them is not lost.
   const std::uint64_t dropped = settings_.missed == MissedTickPolicy::catch_up_once ? lost - 1 : lost;
   count_slips(dropped);

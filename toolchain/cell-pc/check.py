@@ -43,7 +43,8 @@ def read(folder):
     found["cyclictest"] = {"run": cyclictest_alone(folder)}
     if (folder / "latency.json").exists():  # the program's own comparison, made in the same machine
         latency = json.loads((folder / "latency.json").read_text())
-        found["waking"]["latency"], found["cyclictest"]["latency"] = latency["ours"], latency["cyclictest"]
+        found["waking"]["latency"] = latency["ours"] | {"missed": latency["missed"]}
+        found["cyclictest"]["latency"] = latency["cyclictest"]
     return found
 
 
