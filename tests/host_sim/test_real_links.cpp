@@ -246,7 +246,7 @@ TEST_CASE("a run that is asked for it, then dies, leaves its last second twice, 
   }
   CHECK(std::filesystem::exists(out + "/flight-01.bin"));
   REQUIRE(std::filesystem::exists(out + "/flight-crash.bin"));
-  const auto shown = run_program({MOLDLOFT, "replay", out, "--timeline"});
+  const auto shown = run_program({MOLDLOFT, "replay", out, "--timeline", "--all"});
   CHECK(shown.exit_code == 0);
   CHECK(shown.out.find("/flight-01.bin\ncause: ") != std::string::npos);
   CHECK(shown.out.find("/flight-crash.bin\ncause: signal 11, running task: ") != std::string::npos);
@@ -259,7 +259,7 @@ TEST_CASE("a run that is asked for it, then dies, leaves its last second twice, 
 
   const auto events = run_program({MOLDLOFT, "replay", out});
   CHECK(events.exit_code == 0);
-  CHECK(events.out.find("cell     start            idle -> starting\n") != std::string::npos);
+  CHECK(events.out.find("cell     start            Idle -> Starting\n") != std::string::npos);
   CHECK(events.out.find("frame    boundary at x ") != std::string::npos);
 
   const auto nothing = run_program({MOLDLOFT, "replay", folder.file("none"), "--timeline"});

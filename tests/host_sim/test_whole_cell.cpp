@@ -160,7 +160,7 @@ TEST_CASE(
     CHECK(row.threads == 1);
     CHECK(row.worst_normal_mm <= 0.08);
   }
-  CHECK(day->rows.back().ticks == 4 * 25 * 1000 + 4);  // a tick more a plate, which begins at the next
+  CHECK(day->rows.back().ticks == 4 * 25 * 1000 + 1);  // the first tick is due at 0
   CHECK(day->rows.back().shots == 4 * day->rows.front().shots);
   CHECK(day->flat);
 }
