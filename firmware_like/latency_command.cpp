@@ -34,10 +34,7 @@ constexpr double turn_s = 5;
 constexpr double longest_s = 30 * 24 * 3600.0;
 constexpr auto longest_tick = 100ms;
 
-int complain(std::string_view what) {
-  fmt::print(stderr, "moldloft latency: {}\n", what);
-  return exit_failed;
-}
+int refuse(std::string_view what) { return complain(what, "moldloft latency"); }
 
 // Ctrl-C ends the measurement; what was measured so far is reported.
 std::atomic<bool> interrupted{false};
@@ -268,13 +265,13 @@ Json latency_json(const Json& timing) {
 }
 
 int measure_latency(const LatencyOptions& options) {
-  if (const auto why = refused(options)) return complain(*why);
+  if (const auto why = refused(options)) return refuse(*why);
   const auto config = config_of(options);
-  if (!config) return complain(config.error().what);
+  if (!config) return refuse(config.error().what);
   auto place = Workplace::make(options.out);
-  if (!place) return complain(place.error().what);
+  if (!place) return refuse(place.error().what);
   auto folder = create_run(place->path(), config->text, RunKind::measured);
-  if (!folder) return complain(folder.error().what);
+  if (!folder) return refuse(folder.error().what);
   interrupted = false;
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
@@ -286,10 +283,10 @@ int measure_latency(const LatencyOptions& options) {
   const auto load = std::make_unique<LatencyLoad>(*config, clock);
   const auto measured =
       measure(*load, *folder, *config, plan_turns(options.duration_s, config->tick, compare), compare);
-  if (!measured) return complain(measured.error().what);
+  if (!measured) return refuse(measured.error().what);
   if (load->failed())
-    return complain("the fit gave up on a plate that is known to be good: a defect; please report");
-  if (load->recorder().store_failed()) return complain(load->recorder().store_error().view());
+    return refuse("the fit gave up on a plate that is known to be good: a defect; please report");
+  if (load->recorder().store_failed()) return refuse(load->recorder().store_error().view());
 
   Json timing = timing_report({.scheduler = load->scheduler(), .conditions = &measured->conditions});
   timing["busy"] = busy_json(*load);
@@ -300,7 +297,7 @@ int measure_latency(const LatencyOptions& options) {
          {std::pair{"timing.json", timing.dump(2) + "\n"},
           std::pair{"report.html", timing_page(timing, page_title(place->path()))}}) {
       const auto written = write_file(place->path() / name, content);
-      if (!written) return complain(written.error().what);
+      if (!written) return refuse(written.error().what);
     }
   }
   if (options.json)

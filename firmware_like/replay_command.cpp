@@ -16,11 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-int complain(std::string_view what) {
-  fmt::print(stderr, "moldloft: {}\n", what);
-  return exit_failed;
-}
-
 int show_timelines(const ReplayOptions& options) {
   const bool is_file = fs::is_regular_file(options.run);
   if (!is_file && !fs::is_directory(options.run))

@@ -10,32 +10,28 @@
 namespace moldloft::firmware_like {
 namespace {
 
-int complain(std::string_view what) {
-  fmt::print(stderr, "moldloft report: {}\n", what);
-  return exit_failed;
-}
+int refuse(std::string_view what) { return complain(what, "moldloft report"); }
 
 }  // namespace
 
 int report_run(const ReportOptions& options) {
   const std::filesystem::path folder{options.run};
   const auto timing = read_json(folder / "timing.json");
-  if (!timing) return complain(timing.error().what);
+  if (!timing) return refuse(timing.error().what);
   std::string text, page;
   try {
     if (std::filesystem::exists(folder / "summary.json")) {
       const auto summary = read_json(folder / "summary.json");
-      if (!summary) return complain(summary.error().what);
+      if (!summary) return refuse(summary.error().what);
       text = result_table(*summary, options.run) + "\n";
     }
     text += timing_table(*timing);
     page = timing_page(*timing, page_title(folder));
   } catch (const Json::exception& e) {
-    return complain(
-        fmt::format("{}: was not written by this version of moldloft ({})", options.run, e.what()));
+    return refuse(fmt::format("{}: was not written by this version of moldloft ({})", options.run, e.what()));
   }
   if (const auto written = write_file(folder / "report.html", page); !written)
-    return complain(written.error().what);
+    return refuse(written.error().what);
   fmt::print("{}\nreport                      {}\n", text, (folder / "report.html").string());
   return exit_done;
 }

@@ -25,11 +25,6 @@
 namespace moldloft::firmware_like {
 namespace {
 
-int complain(std::string_view what) {
-  fmt::print(stderr, "moldloft: {}\n", what);
-  return exit_failed;
-}
-
 std::atomic<Controller*> interrupted_controller{nullptr};
 std::atomic<bool> interrupted{false};
 
@@ -121,6 +116,11 @@ std::uint32_t fresh_epoch() {
 std::string begun_of(const hal::RunStore& store) { return store.meta("begun").value_or(""); }
 
 }  // namespace
+
+int complain(std::string_view what, std::string_view program) {
+  fmt::print(stderr, "{}: {}\n", program, what);
+  return exit_failed;
+}
 
 int exit_code(const Controller& controller) {
   switch (controller.cell().state()) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "firmware_like/results.hpp"
 
@@ -15,6 +16,9 @@ enum ExitCode : int {
   exit_aborted = 3,
   exit_stopped = 4,  // by ctrl-C
 };
+
+// The one line that a failure is, on standard error; the exit code that goes with it.
+int complain(std::string_view what, std::string_view program = "moldloft");
 
 struct RunOptions {
   std::string config_path;

@@ -25,8 +25,8 @@ struct DayRow {
 struct DayOptions {
   CellDescription cell;
   double hours = 24;  // of cell time
-  double every_s =
-      120;  // from the start of one plate to the start of the next; a plate that takes longer is followed at once
+  // From the start of one plate to the start of the next; a plate that takes longer is followed at once.
+  double every_s = 120;
   int rows = 24;  // of the table, at equal distances
   bool json = false;
   std::function<void(const DayRow&)> on_row = {};  // as soon as it stands
@@ -34,8 +34,8 @@ struct DayOptions {
 
 struct Day {
   std::vector<DayRow> rows;
-  bool flat =
-      false;  // from the first row on: heap within 64 KiB, handles and threads the same, nothing lost or off the beat
+  // From the first row on: heap within 64 KiB, handles and threads the same, nothing lost or off the beat.
+  bool flat = false;
 };
 
 std::expected<Day, SimError> run_day(const DayOptions&);

@@ -15,22 +15,8 @@ cmake --build --preset rtsan --target moldloft realtime_probe
 
 sim=$PWD/build/release/bin/moldloft-sim
 bin=$PWD/build/rtsan/bin
-scratch=$(mktemp -d)
-devices=
-cleanup() {
-  if [ -n "$devices" ]; then kill "$devices" 2>/dev/null || true; wait "$devices" 2>/dev/null || true; fi
-  rm -rf "$scratch"
-}
-trap cleanup EXIT
-
-"$sim" devices --scanner-port 0 --robot-pty "$scratch/robot" --cell "$scratch/cell.toml" --seed 1 "$@" \
-  >"$scratch/devices.log" 2>&1 &
-devices=$!
-for _ in $(seq 100); do
-  grep -q '^ready' "$scratch/devices.log" && break
-  kill -0 "$devices" 2>/dev/null || { cat "$scratch/devices.log" >&2; devices=; exit 1; }
-  sleep 0.1
-done
+. toolchain/devices.sh
+start_devices "$sim" "$@"
 
 # A sanitizer that stops at the first violation leaves no doubt: the exit code is that of a completed run, or it is not.
 # Assertions are compiled in, and the program is several times slower than what is deployed: ticks may be missed.

@@ -14,24 +14,8 @@ cmake --build --preset release --target moldloft moldloft-sim pty_modem
 bin=build/release/bin
 out=out/run-$(date +%Y%m%d-%H%M%S)
 mkdir -p out
-scratch=$(mktemp -d)
-devices=
-cleanup() {
-  if [ -n "$devices" ]; then kill "$devices" 2>/dev/null || true; wait "$devices" 2>/dev/null || true; fi
-  rm -rf "$scratch"
-}
-trap cleanup EXIT
-
-# The devices say on which port they listen and where a configuration that fits them lies.
-"$bin/moldloft-sim" devices --scanner-port 0 --robot-pty "$scratch/robot" --cell "$scratch/cell.toml" --seed 1 "$@" \
-  >"$scratch/devices.log" 2>&1 &
-devices=$!
-for _ in $(seq 100); do
-  grep -q '^ready' "$scratch/devices.log" && break
-  kill -0 "$devices" 2>/dev/null || { cat "$scratch/devices.log" >&2; devices=; exit 1; }
-  sleep 0.1
-done
-grep '^ready' "$scratch/devices.log" || { echo "run: the simulated devices did not come up" >&2; cat "$scratch/devices.log" >&2; exit 1; }
+. toolchain/devices.sh
+start_devices "$bin/moldloft-sim" "$@"
 
 # A pseudo-terminal lacks the modem lines that the serial library asks for; the preloaded library answers for it. On a
 # real serial port the program runs without.

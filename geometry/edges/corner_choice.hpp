@@ -7,8 +7,8 @@
 // to lie together are one.
 //
 // Frame        plan view, mm
-// Work         step() looks whether all are numbers, then examines one candidate a step: one pass over the
-//              edge points, about 5 ns a point
+// Work         step() looks whether all are numbers, then goes one of three rounds over one candidate a step: one
+//              pass over the edge points, about 5 ns a point
 // Allocation   in the constructor only
 // Failure      Error::not_four_sided when other than four are left, too_few_points without candidates or edge
 //              points, not_finite when one of them is no number

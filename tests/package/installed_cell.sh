@@ -1,19 +1,12 @@
 #!/usr/bin/env bash
 # The Debian package in a scratch root: what it holds, its unit as systemd reads it, and the installed program, which
-# measures a plate on the simulated devices. Called by ctest with the build tree, the scratch folder and the source tree.
+# measures a plate on the simulated devices. Called by ctest with the build tree and the source tree.
 set -euo pipefail
-build=$1 scratch=$2 source=$3
+build=$1 source=$2
+. "$source/toolchain/devices.sh"
 root=$scratch/root
-
-devices=
-end() {
-  if [ -n "$devices" ]; then kill "$devices" 2>/dev/null || true; wait "$devices" 2>/dev/null || true; fi
-  rm -rf "$scratch"
-}
-trap end EXIT
 fail() { echo "package: $1" >&2; exit 1; }
 
-rm -rf "$scratch" && mkdir -p "$scratch"
 cpack --config "$build/CPackConfig.cmake" -B "$scratch/made" >"$scratch/cpack.log" 2>&1 || { cat "$scratch/cpack.log" >&2; exit 1; }
 package=$(echo "$scratch"/made/moldloft_*.deb)
 dpkg-deb -x "$package" "$root"
@@ -38,14 +31,7 @@ said=$(systemd-analyze --root="$root" --man=no verify "moldloft@plate.service" 2
 systemd-analyze --root="$root" --offline=true --threshold=17 security "moldloft@plate.service" >"$scratch/security" ||
   { tail -1 "$scratch/security" >&2; fail "the unit is more exposed than 1.7"; }
 
-"$build/bin/moldloft-sim" devices --scanner-port 0 --robot-pty "$scratch/robot" --cell "$scratch/cell.toml" --seed 1 \
-  >"$scratch/devices.log" 2>&1 &
-devices=$!
-for _ in $(seq 200); do
-  grep -q '^ready' "$scratch/devices.log" && break
-  kill -0 "$devices" 2>/dev/null || { cat "$scratch/devices.log" >&2; devices=; exit 1; }
-  sleep 0.1
-done
+start_devices "$build/bin/moldloft-sim"
 LD_PRELOAD=$build/lib/libpty_modem.so timeout 200 "$root/usr/bin/moldloft" run "$scratch/cell.toml" --out "$scratch/run"
 grep -q '"result": "complete"' "$scratch/run/summary.json"
 "$build/bin/moldloft-sim" judge "$scratch/run" --seed 1
