@@ -70,7 +70,8 @@ void SurfaceTask::solve() {
 
 bool SurfaceTask::has_work() const {
   return looking() || keeping() || stage_ == Stage::choosing_corners || stage_ == Stage::building_outline ||
-         stage_ == Stage::folding_reserve || stage_ == Stage::folding || stage_ == Stage::solving;
+         stage_ == Stage::clearing || stage_ == Stage::folding_reserve || stage_ == Stage::folding ||
+         stage_ == Stage::solving;
 }
 
 void SurfaceTask::step(Instant) {
@@ -84,6 +85,9 @@ void SurfaceTask::step(Instant) {
       return step_corners();
     case Stage::building_outline:
       return step_outline();
+    case Stage::clearing:
+      if (fit_.clear_some()) stage_ = Stage::folding_reserve;
+      return;
     case Stage::folding_reserve:
       return step_reserve();
     case Stage::folding:
@@ -122,8 +126,8 @@ void SurfaceTask::step_outline() {
     if (const auto good = map_.check_row(map_row_); !good) return fail(good.error());
   }
   if (map_row_ < geometry::PlanMap::check_rows) return;
-  fit_.begin(map_);
-  stage_ = Stage::folding_reserve;
+  fit_.begin_clearing(map_);
+  stage_ = Stage::clearing;
 }
 
 void SurfaceTask::step_reserve() {

@@ -15,19 +15,16 @@ using Eigen::Vector2d;
 constexpr std::size_t ring_capacity = 2048;
 constexpr std::size_t fewest_points = 8;  // of a branch
 constexpr int rounds = 3;                 // a candidate is moved to where its lines meet and looked at again
+constexpr int divisions = 4;              // of a ring's points between the two branches
+constexpr std::size_t points_a_step =
+    4096;  // of the edge; a ring's points cost more and are at most half as many
 
 double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 // The line of least squared distances through the points that `belongs` picks.
-struct Line {
-  Vector2d mean = Vector2d::Zero(), direction = Vector2d::UnitX();
-  double rms = 0;
-  std::size_t count = 0;
-};
-
 template <typename Belongs>
-Line fit(std::span<const Vector2d> points, const Belongs& belongs) {
-  Line line;
+CornerLine fit(std::span<const Vector2d> points, const Belongs& belongs) {
+  CornerLine line;
   double xx = 0, xy = 0, yy = 0;
   for (const auto& p : points) {
     if (!belongs(p)) continue;
@@ -49,29 +46,6 @@ Line fit(std::span<const Vector2d> points, const Belongs& belongs) {
   return line;
 }
 
-// The two directions in which the points leave `about`: each point goes to the nearer one, the directions follow.
-struct Branches {
-  Vector2d a, b;
-};
-Branches branches(std::span<const Vector2d> points, const Vector2d& about) {
-  Branches two{(points.front() - about).normalized(), {}};
-  double least = 2;
-  for (const auto& p : points) {
-    const Vector2d d = (p - about).normalized();
-    if (d.dot(two.a) < least) least = d.dot(two.a), two.b = d;
-  }
-  for (int pass = 0; pass < 4; ++pass) {
-    Vector2d a = Vector2d::Zero(), b = Vector2d::Zero();
-    for (const auto& p : points) {
-      const Vector2d d = (p - about).normalized();
-      (d.dot(two.a) >= d.dot(two.b) ? a : b) += d;
-    }
-    if (a.norm() > 0) two.a = a.normalized();
-    if (b.norm() > 0) two.b = b.normalized();
-  }
-  return two;
-}
-
 }  // namespace
 
 CornerChoice::CornerChoice(const CornerChoiceSettings& settings) : settings_{settings} {
@@ -87,59 +61,122 @@ void CornerChoice::begin(std::span<const Vector2d> edges, std::span<const Vector
   edges_ = edges;
   candidates_ = candidates.first(std::min(candidates.size(), settings_.max_candidates));
   chosen_.clear();
-  next_ = 0, round_ = 0;
-  checked_ = false;
+  next_ = 0, round_ = 0, edge_ = 0;
+  stage_ = Stage::check;
 }
 
 std::expected<bool, Error> CornerChoice::step() {
   if (candidates_.empty() || edges_.size() < 2 * fewest_points) return std::unexpected(Error::too_few_points);
-  if (!checked_) {
-    const auto is_finite = [](const Vector2d& p) { return p.allFinite(); };
-    if (!std::ranges::all_of(candidates_, is_finite) || !std::ranges::all_of(edges_, is_finite))
-      return std::unexpected(Error::not_finite);
-    checked_ = true;
-    return false;
+  switch (stage_) {
+    case Stage::check: {
+      const auto is_finite = [](const Vector2d& p) { return p.allFinite(); };
+      const auto piece = next_edges();
+      if (!std::ranges::all_of(candidates_, is_finite) || !std::ranges::all_of(piece, is_finite))
+        return std::unexpected(Error::not_finite);
+      if (edge_ == edges_.size()) begin_round(candidates_.front());
+      return false;
+    }
+    case Stage::gather:
+      if (gather(next_edges())) end_gathering();
+      return false;
+    case Stage::spread:
+      spread();
+      stage_ = Stage::divide, division_ = 0;
+      return false;
+    case Stage::divide:
+      divide();
+      if (++division_ == divisions) stage_ = Stage::line_a;
+      return false;
+    case Stage::line_a:
+      lines_[0] = fit(ring_, [&](const Vector2d& p) { return nearer_a(p); });
+      stage_ = Stage::line_b;
+      return false;
+    case Stage::line_b:
+      lines_[1] = fit(ring_, [&](const Vector2d& p) { return !nearer_a(p); });
+      end_round(meet());
+      return false;
+    case Stage::arrange:
+      if (const auto arranged = arrange(); !arranged) return std::unexpected(arranged.error());
+      return true;
   }
-  if (next_ < candidates_.size()) {
-    if (round_ == 0) examined_ = {.position = candidates_[next_]};
-    const bool is_corner = examine(candidates_[next_]);
-    if (is_corner && ++round_ < rounds) return false;
-    if (is_corner) keep(examined_);
-    round_ = 0, ++next_;
-    return false;
-  }
-  if (const auto arranged = arrange(); !arranged) return std::unexpected(arranged.error());
   return true;
 }
 
-void CornerChoice::gather(const Vector2d& about) {
+std::span<const Vector2d> CornerChoice::next_edges() {
+  const auto piece = edges_.subspan(edge_, std::min(points_a_step, edges_.size() - edge_));
+  edge_ += piece.size();
+  return piece;
+}
+
+void CornerChoice::begin_round(const Vector2d& about) {
+  about_ = about;
   ring_.clear();
-  for (const auto& p : edges_) {
-    const double distance = (p - about).norm();
+  edge_ = 0;
+  stage_ = Stage::gather;
+}
+
+// True when the ring is complete, or full.
+bool CornerChoice::gather(std::span<const Vector2d> edges) {
+  for (const auto& p : edges) {
+    const double distance = (p - about_).norm();
     if (distance < settings_.ring_inner_mm || distance > settings_.ring_outer_mm) continue;
-    if (ring_.size() == ring_.capacity()) return;
+    if (ring_.size() == ring_.capacity()) return true;
     ring_.push_back(p);
+  }
+  return edge_ == edges_.size();
+}
+
+void CornerChoice::end_gathering() {
+  if (ring_.size() < 2 * fewest_points) return end_round(false);
+  stage_ = Stage::spread;
+}
+
+// The two directions in which the ring's points leave: that of its first point, and the one that differs most ...
+void CornerChoice::spread() {
+  branch_a_ = (ring_.front() - about_).normalized();
+  double least = 2;
+  for (const auto& p : ring_) {
+    const Vector2d d = (p - about_).normalized();
+    if (d.dot(branch_a_) < least) least = d.dot(branch_a_), branch_b_ = d;
   }
 }
 
-// One round of the candidate at hand; false when it is no corner.
-bool CornerChoice::examine(const Vector2d& candidate) {
-  gather(examined_.position);
-  if (ring_.size() < 2 * fewest_points) return false;
-  const Vector2d about = examined_.position;
-  const Branches two = branches(ring_, about);
-  const auto nearer_a = [&](const Vector2d& p) { return (p - about).dot(two.a) >= (p - about).dot(two.b); };
-  const Line a = fit(ring_, nearer_a);
-  const Line b = fit(ring_, [&](const Vector2d& p) { return !nearer_a(p); });
+// ... then each point goes to the nearer one, and the directions follow.
+void CornerChoice::divide() {
+  Vector2d a = Vector2d::Zero(), b = Vector2d::Zero();
+  for (const auto& p : ring_) {
+    const Vector2d d = (p - about_).normalized();
+    (d.dot(branch_a_) >= d.dot(branch_b_) ? a : b) += d;
+  }
+  if (a.norm() > 0) branch_a_ = a.normalized();
+  if (b.norm() > 0) branch_b_ = b.normalized();
+}
+
+bool CornerChoice::nearer_a(const Vector2d& p) const {
+  return (p - about_).dot(branch_a_) >= (p - about_).dot(branch_b_);
+}
+
+// Moves the candidate at hand to where the lines of its branches meet; false when it is no corner.
+bool CornerChoice::meet() {
+  const auto& [a, b] = lines_;
   if (a.count < fewest_points || b.count < fewest_points) return false;
-  const Vector2d to_a = a.direction.dot(two.a) > 0 ? a.direction : Vector2d{-a.direction};
-  const Vector2d to_b = b.direction.dot(two.b) > 0 ? b.direction : Vector2d{-b.direction};
+  const Vector2d to_a = a.direction.dot(branch_a_) > 0 ? a.direction : Vector2d{-a.direction};
+  const Vector2d to_b = b.direction.dot(branch_b_) > 0 ? b.direction : Vector2d{-b.direction};
   examined_.turn = std::numbers::pi - std::acos(std::clamp(to_a.dot(to_b), -1.0, 1.0));
   examined_.rms_mm = std::hypot(a.rms, b.rms);
   if (examined_.turn < settings_.min_turn) return false;
   examined_.position =
       a.mean + cross(b.mean - a.mean, b.direction) / cross(a.direction, b.direction) * a.direction;
-  return examined_.position.allFinite() && (examined_.position - candidate).norm() <= settings_.ring_outer_mm;
+  return examined_.position.allFinite() &&
+         (examined_.position - candidates_[next_]).norm() <= settings_.ring_outer_mm;
+}
+
+void CornerChoice::end_round(bool is_corner) {
+  if (is_corner && ++round_ < rounds) return begin_round(examined_.position);
+  if (is_corner) keep(examined_);
+  round_ = 0;
+  if (++next_ < candidates_.size()) return begin_round(candidates_[next_]);
+  stage_ = Stage::arrange;
 }
 
 // Of corners that lie together the one whose branches are straightest is kept.

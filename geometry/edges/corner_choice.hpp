@@ -7,8 +7,8 @@
 // to lie together are one.
 //
 // Frame        plan view, mm
-// Work         step() looks whether all are numbers, then goes one of three rounds over one candidate a step: one
-//              pass over the edge points, about 5 ns a point
+// Work         step() makes one pass: over 4,096 edge points (are they numbers, which lie in the ring) or over the
+//              points of one ring, at most 2,048; about ten of them a round, three rounds a candidate
 // Allocation   in the constructor only
 // Failure      Error::not_four_sided when other than four are left, too_few_points without candidates or edge
 //              points, not_finite when one of them is no number
@@ -33,6 +33,12 @@ struct CornerChoiceSettings {
   std::size_t max_candidates = 64;
 };
 
+struct CornerLine {
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero(), direction = Eigen::Vector2d::UnitX();
+  double rms = 0;
+  std::size_t count = 0;
+};
+
 class CornerChoice {
  public:
   explicit CornerChoice(const CornerChoiceSettings&);
@@ -50,8 +56,16 @@ class CornerChoice {
     Eigen::Vector2d position;
     double turn = 0, rms_mm = 0;
   };
-  bool examine(const Eigen::Vector2d& candidate);
-  void gather(const Eigen::Vector2d& about);
+  enum class Stage : std::uint8_t { check, gather, spread, divide, line_a, line_b, arrange };
+  std::span<const Eigen::Vector2d> next_edges();
+  void begin_round(const Eigen::Vector2d& about);
+  bool gather(std::span<const Eigen::Vector2d> edges);
+  void end_gathering();
+  void spread();
+  void divide();
+  bool nearer_a(const Eigen::Vector2d&) const;
+  bool meet();
+  void end_round(bool is_corner);
   void keep(const Corner&);
   std::expected<void, Error> arrange();
 
@@ -60,10 +74,14 @@ class CornerChoice {
   std::vector<Eigen::Vector2d> ring_;
   std::vector<Corner> chosen_;
   std::array<Eigen::Vector2d, 4> corners_;
-  std::size_t next_ = 0;
-  int round_ = 0;  // of the candidate at hand
+  Stage stage_ = Stage::check;
+  std::size_t next_ = 0;          // candidate
+  int round_ = 0, division_ = 0;  // of the candidate at hand
+  std::size_t edge_ = 0;          // the next edge point to look at
+  Eigen::Vector2d about_;         // middle of the ring
+  Eigen::Vector2d branch_a_, branch_b_;
+  std::array<CornerLine, 2> lines_;
   Corner examined_;
-  bool checked_ = false;
 };
 
 }  // namespace moldloft::geometry

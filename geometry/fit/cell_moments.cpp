@@ -7,17 +7,18 @@
 
 namespace moldloft::geometry {
 
-void MomentGrid::clear() {
-  std::fill(cells_.begin(), cells_.end(), CellMoments{});
-  std::fill(counts_.begin(), counts_.end(), 0u);
+void MomentGrid::clear(int first, int end) {
+  std::fill(cells_.begin() + first, cells_.begin() + end, CellMoments{});
+  std::fill(counts_.begin() + first, counts_.begin() + end, 0u);
 }
 
-void MomentGrid::merge_row(int i, const MomentGrid& fine) {
+void MomentGrid::merge_cells(int first, int end, const MomentGrid& fine) {
   const int halves_u = fine.cells_u_ / cells_u_, halves_v = fine.cells_v_ / cells_v_;
   assert(halves_u * cells_u_ == fine.cells_u_ && halves_u <= 2);
   assert(halves_v * cells_v_ == fine.cells_v_ && halves_v <= 2);
   const MomentKernel& kernel = moment_kernel();
-  for (int j = 0; j < cells_v_; ++j) {
+  for (int k = first; k < end; ++k) {
+    const int i = k / cells_v_, j = k % cells_v_;
     const CellMoments* halves[4] = {};
     points(i, j) = 0;
     for (int a = 0; a < halves_u; ++a) {

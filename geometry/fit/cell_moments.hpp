@@ -60,11 +60,15 @@ class MomentGrid {
   std::uint32_t& points(int i, int j) { return counts_[i * cells_v_ + j]; }
   std::uint32_t points(int i, int j) const { return counts_[i * cells_v_ + j]; }
   CellMoments* cells() { return cells_.data(); }
+  const CellMoments* cells() const { return cells_.data(); }
   std::uint32_t* counts() { return counts_.data(); }
-  void clear();
+  int cell_count() const { return cells_u_ * cells_v_; }
+  void clear(int first, int end);  // of the cells, row after row
+  void clear() { clear(0, cell_count()); }
 
-  // Fills row i of this grid from `fine`, whose cells are halves of this grid's cells in u, in v, or in both.
-  void merge_row(int i, const MomentGrid& fine);
+  // Fills the cells [first, end) of this grid, row after row, from `fine`, whose cells are halves of this grid's in
+  // u, in v, or in both.
+  void merge_cells(int first, int end, const MomentGrid& fine);
   // Fills this grid from `fine`, cell (i, j) from the fine cells [at_u[i], at_u[i + 1]) x [at_v[j], at_v[j
   // + 1]). Allocates for the restriction matrices.
   void merge_blocks(const MomentGrid& fine, std::span<const int> at_u, std::span<const int> at_v);

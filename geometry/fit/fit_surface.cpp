@@ -198,7 +198,7 @@ class Fitter {
       u = std::max(u / 2, fewest_spans), v = std::max(v / 2, fewest_spans);
       Candidate c = candidate(settings_, u, v);
       c.merged.emplace(u, v);
-      for (int i = 0; i < u; ++i) c.merged->merge_row(i, grid(candidates_.back()));
+      c.merged->merge_cells(0, u * v, grid(candidates_.back()));
       candidates_.push_back(std::move(c));
     }
   }

@@ -11,8 +11,14 @@ namespace {
 // A pivot below this share of the largest is rounding, not data.
 constexpr double pivot_floor = 1e-15;
 
-// Multiply-adds, about, of the pieces that do not depend on the net's size.
-constexpr double gram_cost = 2000, load_cost = 190, fairing_cost = 700;
+// Multiply-adds, about, of the pieces that do not depend on the net's size. What is no vector loop counts by the
+// instructions it takes: four or five are as long as a multiply-add of a panel.
+constexpr double gram_cost = 2000, load_cost = 220, fairing_cost = 700, touch_cost = 30,
+                 unknown_fairing_cost = 130;
+constexpr double offset_cost = 1.6;  // of an entry of the shots' columns
+
+// What a step may take at once where the band is so wide that a whole panel would be more.
+constexpr double longest_piece = 52'000;
 
 using ConstVector = Eigen::Map<const Eigen::VectorXd>;
 
@@ -44,7 +50,7 @@ void NetSolver::start(const NetTask& task, ShotOffsets* shots) {
 
 template <typename Piece>
 bool NetSolver::advance(int end, double cost_of_one, Piece&& piece, int grain) {
-  const int room = static_cast<int>((budget_ - work_) / cost_of_one) / grain * grain;
+  const int room = static_cast<int>(std::min<double>(end, (budget_ - work_) / cost_of_one)) / grain * grain;
   if (room < grain && work_ > 0) {
     full_ = true;
     return false;
@@ -58,9 +64,10 @@ bool NetSolver::advance(int end, double cost_of_one, Piece&& piece, int grain) {
   return true;
 }
 
-void NetSolver::add_data_row(int row) {
+void NetSolver::add_data(int first, int end) {
   const SplineNet& net = *task_.net;
-  for (int j = 0; j < task_.moments->cells_v(); ++j) {
+  for (int k = first; k < end; ++k) {
+    const int row = k / task_.moments->cells_v(), j = k % task_.moments->cells_v();
     const CellMoments& moments = task_.moments->cell(row, j);
     const std::uint32_t points = task_.moments->points(row, j);
     result_.empty_cells += points == 0;
@@ -203,8 +210,8 @@ bool NetSolver::step_shots() {
   ShotOffsets& shots = *shots_;
   switch (phase_) {
     case Phase::touch:
-      if (each_shot(30, [&](int slot, std::size_t first, std::size_t) {
-            if (first == 0) shots.touch(slot, *task_.net);
+      if (each_shot(touch_cost, [&](int slot, std::size_t first, std::size_t end) {
+            shots.touch(slot, *task_.net, first, end);
           })) {
         shots.start(*task_.net);
         phase_ = Phase::columns;
@@ -251,16 +258,16 @@ bool NetSolver::step_shots() {
       return true;
     case Phase::schur:
       if (!shots.factor_row(column_, rho_)) return false;
-      work_ += 0.5 * column_ * column_ + 50 * column_;
+      work_ += 0.6 * column_ * column_ + 60 * column_;
       if (++column_ == shots.count()) {
         take_offsets();
-        work_ += 2.0 * column_ * column_;
+        work_ += 2.4 * column_ * column_;
         phase_ = Phase::offsets, column_ = 0;
       }
       return true;
     default:
       // y - W d, and on the way y'(y - W d), in slices of rows.
-      if (advance(n, shots.row_length(), [&](int a, int b) {
+      if (advance(n, offset_cost * shots.row_length(), [&](int a, int b) {
             double before_after = 0;
             for (int i = a; i < b; ++i) {
               right_[i] = shots.moved(i);
@@ -299,16 +306,15 @@ std::expected<bool, Error> NetSolver::piece() {
       }
       return false;
     case Phase::data:
-      if (advance(rows, gram_cost * cells, [&](int a, int b) {
-            for (; a < b; ++a) add_data_row(a);
-          })) {
+      if (advance(task_.moments->cell_count(), gram_cost, [&](int a, int b) { add_data(a, b); })) {
         const double ratio = trace_data_ / net.fairing_trace(task_.length_u_mm, task_.length_v_mm);
         fairing_ = task_.fairing * ratio, sparse_fairing_ = task_.sparse_fairing * ratio;
         phase_ = Phase::fair;
       }
       return false;
     case Phase::fair:
-      if (fairing_ <= 0 || advance(net.slow_rows(), 100.0 * n / net.slow_rows(), [&](int a, int b) {
+      if (fairing_ <= 0 ||
+          advance(net.slow_rows(), unknown_fairing_cost * n / net.slow_rows(), [&](int a, int b) {
             net.add_fairing(matrix_, a, b, task_.length_u_mm, task_.length_v_mm, fairing_);
           })) {
         phase_ = Phase::border;
@@ -330,8 +336,12 @@ std::expected<bool, Error> NetSolver::piece() {
       return false;
     case Phase::factor: {
       bool positive = true;
+      const double column_cost = 0.5 * band * (band + 8);
+      // Narrower panels give the same numbers, only less quickly.
+      const int panel =
+          static_cast<int>(std::clamp(std::max(budget_, longest_piece) / column_cost, 1.0, 1.0 * band_panel));
       const bool finished = advance(
-          n, 0.5 * band * (band + 8), [&](int a, int b) { positive = matrix_.factor(a, b); }, band_panel);
+          n, column_cost, [&](int a, int b) { positive = matrix_.factor(a, b); }, panel);
       if (!positive) return std::unexpected(Error::singular);
       if (!finished) return false;
       result_.smallest_pivot = matrix_.smallest_pivot() / matrix_.largest_pivot();
@@ -360,7 +370,8 @@ std::expected<bool, Error> NetSolver::piece() {
         phase_ = Phase::energy;
       return false;
     case Phase::energy:
-      if (fairing_ <= 0 || advance(net.slow_rows(), 100.0 * n / net.slow_rows(), [&](int a, int b) {
+      if (fairing_ <= 0 ||
+          advance(net.slow_rows(), unknown_fairing_cost * n / net.slow_rows(), [&](int a, int b) {
             objective_ -=
                 fairing_ * net.fairing_energy(coefficients(), a, b, task_.length_u_mm, task_.length_v_mm);
           })) {
@@ -384,7 +395,7 @@ std::expected<bool, Error> NetSolver::piece() {
 
 std::expected<void, Error> NetSolver::solve() {
   while (true) {
-    const auto ready = step();
+    const auto ready = step(std::numeric_limits<double>::max());
     if (!ready) return std::unexpected(ready.error());
     if (*ready) return {};
   }

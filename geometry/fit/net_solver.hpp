@@ -5,8 +5,8 @@
 //              of traces)
 // Boundary     the outer ring of coefficients, if given: moved to the right side (thesis eq. 3.40, 3.41),
 //              or pulled at with a weight
-// Cost         unknowns * half_band^2 / 2 in all. A step takes at most `work_a_step` multiply-adds, or one
-//              panel of eight columns, if that is more; work() counts them
+// Cost         unknowns * half_band^2 / 2 in all. A step takes at most `work_a_step` multiply-adds, or, if that is
+//              more, one panel of eight columns or one column of at most 52,000; work() counts them
 // Allocation   in the constructor only
 // Failure      Error::singular where a pivot is not positive; singular_unknown() says which
 #pragma once
@@ -71,6 +71,7 @@ class NetSolver {
   std::span<const double> coefficients() const { return {right_.data(), static_cast<std::size_t>(size())}; }
   int singular_unknown() const { return matrix_.failed_column(); }
   double work() const { return work_; }  // multiply-adds of the last step
+  bool full() const { return full_; }    // it ended because its next piece had no room
   const BandCholesky& factor() const { return matrix_; }
   double norm_one() const { return norm_one_; }  // of the matrix that was factored, if asked for before
   void want_norm(bool wanted) { norm_wanted_ = wanted; }
@@ -103,7 +104,7 @@ class NetSolver {
   // Advances the cursor by one slice; true when it has reached `end`, and then it starts again from 0.
   template <typename Piece>
   bool advance(int end, double cost_of_one, Piece&& piece, int grain = 1);
-  void add_data_row(int row);
+  void add_data(int first_cell, int end_cell);
   void add_sparse_fairing_row(int row);
   void add_border();
   void take_norm(int first, int end);

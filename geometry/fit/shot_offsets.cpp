@@ -131,11 +131,10 @@ void ShotOffsets::coarsen(int slot, const MomentGrid& to, std::size_t first, std
   for (std::size_t k = s.begin; k < s.end; ++k) place_of_cell_[cells_[k].cell] = -1;
 }
 
-void ShotOffsets::touch(int slot, const SplineNet& net) {
+void ShotOffsets::touch(int slot, const SplineNet& net, std::size_t first, std::size_t end) {
   Slot& s = slots_[slot];
-  s.first_row = net.unknowns();
-  s.weight = 0;
-  for (std::size_t k = s.begin; k < s.end; ++k) {
+  if (first == 0) s.first_row = net.unknowns(), s.weight = 0;
+  for (std::size_t k = s.begin + first; k < s.begin + end; ++k) {
     s.first_row =
         std::min(s.first_row, net.first_index(cells_[k].cell / level_v_, cells_[k].cell % level_v_));
     for (const double m : cells_[k].moments) s.weight += m;  // the cubics sum to one

@@ -46,7 +46,7 @@ class ShotOffsets {
 
   // For one net: touch() every slot, start(), clear_rows(), scatter() every slot and the right-hand side of
   // y, solve all groups by the caller's band solve, form() all blocks, then factor and solve.
-  void touch(int slot, const SplineNet&);
+  void touch(int slot, const SplineNet&, std::size_t first, std::size_t end);
   void start(const SplineNet&);
   int row_length() const { return row_length_; }
   int groups() const { return row_length_ / 8; }

@@ -23,6 +23,8 @@ constexpr int fewest_spans = 4;  // of a side as well: the nets must refine the 
 // Multiply-adds, about: of a cell from four, of a shot's cell into a coarser one, and of a cell's weight.
 constexpr double merge_cost = 2000, restrict_cost = 200, total_cost = 100;
 
+constexpr int cleared_a_step = 512;  // cells: 0.3 MB
+
 // A net is tried when it has at least this many points for every unknown.
 constexpr double points_an_unknown = 4;
 
@@ -92,11 +94,11 @@ struct SurfaceFit::Work {
   Phase phase = Phase::adding;
   Error error = Error::too_few_points;
   std::size_t level = 0, first_level = 0, best = 0;
-  int row = 0, shot = 0;
+  int cell = 0, shot = 0;
   std::size_t shot_cell = 0, shot_cells = 0;  // of the shot that merging is at
   double best_score = 0, point_sigma = 0;
   double work = 0;
-  bool full = false;  // merging stopped because the step has no room for the next piece
+  bool full = false;  // the step has no room for the next piece
   PointBlock block;
   std::array<double, PointBlock::capacity> u, v;
 };
@@ -120,8 +122,22 @@ std::size_t SurfaceFit::bytes() const {
 }
 
 void SurfaceFit::begin(const PlanMap& map) {
+  begin_clearing(map);
+  while (!clear_some()) {
+  }
+}
+
+bool SurfaceFit::clear_some() {
+  MomentGrid& finest = work_->moments.front();
+  const int end = std::min(work_->cell + cleared_a_step, finest.cell_count());
+  finest.clear(work_->cell, end);
+  work_->cell = end;
+  return end == finest.cell_count();
+}
+
+void SurfaceFit::begin_clearing(const PlanMap& map) {
   work_->map = &map;
-  work_->moments.front().clear();
+  work_->cell = 0;
   work_->shots.clear();
   work_->totals = {};
   work_->report = {};
@@ -180,7 +196,7 @@ void SurfaceFit::start_solving() {
   work.shots.finish_adding();
   work.totals.weight = work.totals.squares = 0;
   work.report.points_used = work.totals.points;
-  work.level = 0, work.row = work.shot = 0, work.shot_cell = 0;
+  work.level = 0, work.cell = work.shot = 0, work.shot_cell = 0;
   work.best_score = std::numeric_limits<double>::infinity();
   work.point_sigma = work.settings.noise_mm;
   // Nets with more unknowns than the points determine are passed over; their moments are merged all the same.
@@ -198,20 +214,15 @@ void SurfaceFit::start_solving() {
   work.phase = Work::Phase::total;
 }
 
-// What all cells hold together, row by row; true when the last is in.
+// What all cells hold together; true when the last is in.
 bool SurfaceFit::Work::total_some() {
   const MomentGrid& grid = moments.front();
-  const double row_cost = total_cost * grid.cells_v();
-  while (row < grid.cells_u()) {
-    if (work > 0 && work + row_cost > NetSolver::work_a_step) return false;
-    for (int j = 0; j < grid.cells_v(); ++j) {
-      totals.weight += grid.cell(row, j).weight();
-      totals.squares += grid.cell(row, j).squares();
-    }
-    ++row;
-    work += row_cost;
+  for (; cell < grid.cell_count(); ++cell, work += total_cost) {
+    if (work + total_cost > NetSolver::work_a_step) return false;
+    totals.weight += grid.cells()[cell].weight();
+    totals.squares += grid.cells()[cell].squares();
   }
-  row = 0;
+  cell = 0;
   return true;
 }
 
@@ -227,14 +238,16 @@ void SurfaceFit::Work::start_level() {
   phase = Phase::solve;
 }
 
-// Rows of cells, then the shots' cells, into those of the next net; true when all are merged.
+// Cells, then the shots' cells, into those of the next net; true when all are merged.
 bool SurfaceFit::Work::merge_some() {
   MomentGrid& grid = moments[level];
-  const double row_cost = merge_cost * grid.cells_v();
-  while (row < grid.cells_u()) {
-    if (work > 0 && work + row_cost > NetSolver::work_a_step) return false;
-    grid.merge_row(row++, moments[level - 1]);
-    work += row_cost;
+  if (cell < grid.cell_count()) {
+    const int room = static_cast<int>(std::max(0.0, NetSolver::work_a_step - work) / merge_cost);
+    const int end = std::min(cell + room, grid.cell_count());
+    grid.merge_cells(cell, end, moments[level - 1]);
+    work += merge_cost * (end - cell);
+    cell = end;
+    if (cell < grid.cell_count()) return false;
   }
   while (shot < shots.count()) {
     if (shot_cell == 0) shot_cells = shots.cells_of(shot);
@@ -248,7 +261,7 @@ bool SurfaceFit::Work::merge_some() {
     ++shot, shot_cell = 0;
   }
   shots.coarsened(grid);
-  row = shot = 0;
+  cell = shot = 0;
   return true;
 }
 
@@ -318,6 +331,7 @@ std::expected<bool, Error> SurfaceFit::Work::piece() {
     case Phase::solve: {
       const auto solved = solver.step(NetSolver::work_a_step - work);
       work += solver.work();
+      full = solver.full();
       if (!solved) {
         error = solved.error(), phase = Phase::failed;
         return std::unexpected(error);

@@ -51,15 +51,18 @@ struct SurfaceFitReport {
 
 class SurfaceFit {
  public:
-  // What a step of the solution may cost in multiply-adds, as long as no net has more than 64 spans a side: 6 us with
-  // AVX-512, 200 us on a processor of 500 million instructions a second.
-  static constexpr double work_a_step = 70'000;
+  // What a step of the solution may cost in multiply-adds, as long as no net has more than 100 spans on its shorter
+  // side: 6 us with AVX-512, 200 us on a processor of 500 million instructions a second.
+  static constexpr double work_a_step = 62'000;
 
   explicit SurfaceFit(const SurfaceFitSettings&);
   ~SurfaceFit();
 
   void begin(const PlanMap& map)
       MOLDLOFT_GEOMETRY_NONBLOCKING;  // forgets everything; the map must stay alive
+  // The same in bounded pieces: points may be added once clear_some() has said true.
+  void begin_clearing(const PlanMap& map) MOLDLOFT_GEOMETRY_NONBLOCKING;
+  bool clear_some() MOLDLOFT_GEOMETRY_NONBLOCKING;
   // Folds points of one shot in. `shot` counts from 0; all points of one shot must be added before another
   // shot begins. Points off the plate are counted and left out. Wholly bounded by the size of the chunk.
   std::expected<void, Error> add(std::span<const Eigen::Vector3d> world_points, double weight,

@@ -11,13 +11,13 @@ namespace {
 
 const std::array<Vector2d, 4> corners{Vector2d{0, 0}, {700, 40}, {640, 400}, {-60, 330}};
 
-// Edge points every 2 mm, the boundary torn into teeth of a depth that repeats every `pitch`.
-std::vector<Vector2d> torn_outline(double depth, double pitch) {
+// Edge points every `spacing`, the boundary torn into teeth of a depth that repeats every `pitch`.
+std::vector<Vector2d> torn_outline(double depth, double pitch, double spacing = 2) {
   std::vector<Vector2d> points;
   for (std::size_t i = 0; i < 4; ++i) {
     const Vector2d a = corners[i], d = corners[(i + 1) % 4] - a, along = d.normalized(),
                    out{along.y(), -along.x()};
-    for (double s = 1; s < d.norm(); s += 2) {
+    for (double s = spacing / 2; s < d.norm(); s += spacing) {
       const double phase = std::fmod(s, pitch) / pitch;
       points.push_back(a + s * along + depth * (phase - 0.5) * out);
     }
@@ -26,7 +26,7 @@ std::vector<Vector2d> torn_outline(double depth, double pitch) {
 }
 
 std::expected<bool, Error> run(CornerChoice& choice) {
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < 5000; ++i) {
     const auto done = choice.step();
     if (!done || *done) return done;
   }
@@ -61,6 +61,22 @@ TEST_CASE("on a clean boundary the corner is where the lines meet, whatever the 
     for (const auto& f : choice.corners()) nearest = std::min(nearest, (f - c).norm());
     CHECK(nearest < 1e-6);
   }
+}
+
+TEST_CASE("edge points that take more than one step to look at are all looked at") {
+  auto edges = torn_outline(0, 10, 0.2);
+  REQUIRE(edges.size() > 2 * 4096);
+  CornerChoice choice{{}};
+  choice.begin(edges, corners);  // the last corner's ring lies in the last step's points
+  REQUIRE(run(choice).value());
+  for (const auto& c : choice.corners()) {
+    double nearest = 1e9;
+    for (const auto& known : corners) nearest = std::min(nearest, (known - c).norm());
+    CHECK(nearest < 1e-6);
+  }
+  edges.back().y() = std::nan("");
+  choice.begin(edges, corners);
+  CHECK(run(choice).error() == Error::not_finite);
 }
 
 TEST_CASE("a corner that nobody saw leaves three, which is not a plate of four sides") {
