@@ -81,9 +81,9 @@ std::size_t ShotView::next_kind() const {
     case Stage::unpack:
       return 1;
     case Stage::cut:
-      return 2;
+      return finder_.walks() ? 2 : 3;
     case Stage::find:
-      return finder_.describes() ? 4 : 3;
+      return finder_.describes() ? 5 : 4;
     case Stage::boundary:
     case Stage::done:
       return 0;

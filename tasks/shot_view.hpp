@@ -54,7 +54,7 @@ class ShotView {
 
  private:
   enum class Stage : std::uint8_t { unpack, cut, find, boundary, done };
-  static constexpr std::size_t points_a_step = 2048, stripes_a_step = 2, runs_a_step = 16;
+  static constexpr std::size_t points_a_step = 2048, stripes_a_step = 8, runs_a_step = 16;
   bool end() MOLDLOFT_NONBLOCKING;
   bool within_margins(const geometry::PlateRun&, std::uint32_t point) const;
   bool is_outlier(const geometry::PlateRun&, std::uint32_t point) const;

@@ -25,7 +25,8 @@ constexpr std::size_t trim_points = 3;   // as many points as a side wall leaves
 
 // Runs a stripe may hold on average: a field of 102 mm holds 34 of the shortest.
 constexpr std::size_t runs_per_stripe = 40;
-constexpr std::size_t stripes_in_turn = 2;
+constexpr std::size_t stripes_in_turn = StripeLanes::count;
+constexpr std::size_t points_in_turn = 192;
 constexpr std::uint32_t farthest_link =
     3;  // stripes ahead: two may be missing between two runs of one region
 
@@ -55,11 +56,12 @@ struct PlateRunFinder::Run {
   double y_first, y_last;
 };
 
-PlateRunFinder::PlateRunFinder(std::size_t max_stripes, std::size_t max_points)
-    : max_stripes_(max_stripes), max_points_(max_points) {
+PlateRunFinder::PlateRunFinder(std::size_t max_stripes, std::size_t max_points, Simd simd)
+    : max_stripes_(max_stripes), max_points_(max_points), simd_(simd) {
   good_.reserve(max_points);
   pieces_.reserve(max_points / fewest_piece_points + 1);
   walked_.resize(max_points / fewest_piece_points + stripes_in_turn);
+  walks_.reserve(stripes_in_turn);
   runs_.reserve(max_stripes * runs_per_stripe);
   found_.reserve(max_stripes * runs_per_stripe);
   first_run_.reserve(max_stripes + 1);
@@ -71,44 +73,41 @@ PlateRunFinder::PlateRunFinder(PlateRunFinder&&) noexcept = default;
 std::size_t PlateRunFinder::bytes() const {
   return good_.capacity() * sizeof(good_[0]) +
          (pieces_.capacity() + walked_.capacity()) * sizeof(StripePiece) + runs_.capacity() * sizeof(Run) +
-         found_.capacity() * sizeof(PlateRun) + first_run_.capacity() * sizeof(first_run_[0]);
+         found_.capacity() * sizeof(PlateRun) + walks_.capacity() * sizeof(StripeWalk) +
+         first_run_.capacity() * sizeof(first_run_[0]);
 }
 
-// Walks along the next stripes in turn, then makes runs of each. What a walk finds lies apart until the
-// stripes before it are done: behind the room that they may take.
-bool PlateRunFinder::cut_in_turn(std::size_t count, const PlateRunSettings& settings) {
-  std::array<StripeWalk, stripes_in_turn> walk;
-  std::array<std::size_t, stripes_in_turn> good_at, pieces_at;
-  std::size_t good_end = good_.size(), pieces_end = 0;
+// The next stripes are walked in turn. What a walk finds lies apart until the stripes before it are done: behind the
+// room that they may take.
+void PlateRunFinder::begin_walks(std::size_t count, const PlateRunSettings& settings) {
+  std::size_t good_at = good_.size(), pieces_at = 0;
+  for (std::size_t k = 0; k < count; ++k) good_at += stripes_[next_stripe_ + k].z.size();
+  kept_ = good_.size();
+  good_.resize(good_at);  // within what is reserved: no stripe leaves more indices than it has points
+  good_at = kept_;
+  walks_.clear();
   for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t points = stripes_[next_stripe_ + k].z.size();
-    good_at[k] = good_end, pieces_at[k] = pieces_end;
-    good_end += points, pieces_end += points / fewest_piece_points + 1;
+    const StripeView& stripe = stripes_[next_stripe_ + k];
+    walks_.push_back(StripeWalk(stripe, settings, good_.data() + good_at, &walked_[pieces_at]));
+    good_at += stripe.z.size(), pieces_at += stripe.z.size() / fewest_piece_points + 1;
   }
-  const std::size_t begin = good_.size();
-  good_.resize(good_end);  // within what is reserved: no stripe leaves more indices than it has points
-  for (std::size_t k = 0; k < count; ++k)
-    walk[k] = StripeWalk(stripes_[next_stripe_ + k], settings, &good_[good_at[k]], &walked_[pieces_at[k]]);
-  if (count == stripes_in_turn) {
-    static_assert(stripes_in_turn == 2);
-    while (walk[0].step() && walk[1].step()) {
-    }
-  }
-  for (std::size_t k = 0; k < count; ++k) {
-    while (walk[k].step()) {
-    }
-  }
+  walking_ = true;
+}
 
-  std::size_t kept = begin;
-  for (std::size_t k = 0; k < count; ++k, ++next_stripe_) {
-    std::copy_n(good_.begin() + good_at[k], walk[k].good_count(), good_.begin() + kept);
-    pieces_.assign(walked_.begin() + pieces_at[k], walked_.begin() + pieces_at[k] + walk[k].piece_count());
-    for (StripePiece& piece : pieces_) piece.begin += static_cast<std::uint32_t>(kept);
-    kept += walk[k].good_count();
+// Makes runs of what the walks have found; false when there are too many.
+bool PlateRunFinder::keep_walked(const PlateRunSettings& settings) {
+  for (const StripeWalk& walk : walks_) {
+    const auto good = walk.good();
+    pieces_.assign(walk.pieces().begin(), walk.pieces().end());
+    for (StripePiece& piece : pieces_) piece.begin += static_cast<std::uint32_t>(kept_);
+    std::copy(good.begin(), good.end(), good_.begin() + static_cast<std::ptrdiff_t>(kept_));
+    kept_ += good.size();
     first_run_.push_back(static_cast<std::uint32_t>(runs_.size()));
     if (!keep_runs(static_cast<std::uint16_t>(next_stripe_), stripes_[next_stripe_], settings)) return false;
+    ++next_stripe_;
   }
-  good_.resize(kept);
+  good_.resize(kept_);
+  walks_.clear();
   return true;
 }
 
@@ -294,7 +293,11 @@ std::expected<std::span<const PlateRun>, Error> PlateRunFinder::find(std::span<c
                                                                      const Eigen::Vector3d& hint,
                                                                      const PlateRunSettings& settings) {
   if (const auto begun = begin(stripes); !begun) return std::unexpected(begun.error());
-  if (const auto cut = cut_stripes(stripes.size(), settings); !cut) return std::unexpected(cut.error());
+  for (bool all = false; !all;) {
+    const auto cut = cut_stripes(stripes_in_turn, settings);
+    if (!cut) return std::unexpected(cut.error());
+    all = *cut;
+  }
   if (const auto found = find_plate(std::numeric_limits<std::size_t>::max(), hint, settings); !found)
     return std::unexpected(found.error());
   return plate_runs();
@@ -308,7 +311,8 @@ std::expected<void, Error> PlateRunFinder::begin(std::span<const StripeView> str
   }
   if (stripes.size() > max_stripes_ || points > max_points_) return std::unexpected(Error::capacity);
 
-  good_.clear(), runs_.clear(), first_run_.clear(), found_.clear();
+  good_.clear(), runs_.clear(), first_run_.clear(), found_.clear(), walks_.clear();
+  walking_ = false;
   stripes_ = stripes;
   next_stripe_ = 0, next_run_ = 0;
   stage_ = Stage::link, links_ahead_ = 1;
@@ -317,11 +321,13 @@ std::expected<void, Error> PlateRunFinder::begin(std::span<const StripeView> str
 
 std::expected<bool, Error> PlateRunFinder::cut_stripes(std::size_t at_most,
                                                        const PlateRunSettings& settings) {
-  const std::size_t end = std::min(stripes_.size(), next_stripe_ + at_most);
-  while (next_stripe_ < end) {
-    if (!cut_in_turn(std::min(stripes_in_turn, end - next_stripe_), settings))
-      return std::unexpected(Error::capacity);
+  if (walks_.empty() && next_stripe_ < stripes_.size())
+    begin_walks(std::min({at_most, stripes_in_turn, stripes_.size() - next_stripe_}), settings);
+  if (walking_) {
+    walking_ = !StripeWalk::walk_in_turn(walks_, stripe_kernel(simd_), points_in_turn);
+    return false;
   }
+  if (!keep_walked(settings)) return std::unexpected(Error::capacity);
   return next_stripe_ == stripes_.size();
 }
 

@@ -24,10 +24,12 @@
 
 #include "geometry/error.hpp"
 #include "geometry/nonblocking.hpp"
+#include "geometry/simd.hpp"
 
 namespace moldloft::geometry {
 
 struct StripePiece;  // a stretch of one stripe before stretches are joined
+class StripeWalk;
 
 struct StripeView {  // columns of equal length, ordered along +y; NaN where a point is missing
   std::span<const float> x, y, z;
@@ -62,7 +64,7 @@ struct PlateRunSettings {
 
 class PlateRunFinder {
  public:
-  PlateRunFinder(std::size_t max_stripes, std::size_t max_points);
+  PlateRunFinder(std::size_t max_stripes, std::size_t max_points, Simd = widest_simd());
   ~PlateRunFinder();
   PlateRunFinder(PlateRunFinder&&) noexcept;
 
@@ -72,13 +74,17 @@ class PlateRunFinder {
                                                        const Eigen::Vector3d& hint,
                                                        const PlateRunSettings& settings);
 
-  // The same in bounded pieces: begin(), cut_stripes() until it says true (4 us a stripe), then find_plate() until
-  // it says true (0.2 us a run), plate_runs(). The stripes are the caller's and must stay until then.
+  // The same in bounded pieces: begin(), cut_stripes() until it says true (it goes at most 192 points along at most
+  // eight stripes, 5 us, or makes runs of what it has found there), then find_plate() until it says true (0.2 us a
+  // run), plate_runs(). The stripes are the caller's and must stay until then.
   std::expected<void, Error> begin(std::span<const StripeView> stripes) MOLDLOFT_GEOMETRY_NONBLOCKING;
   std::expected<bool, Error> cut_stripes(std::size_t at_most,
                                          const PlateRunSettings& settings) MOLDLOFT_GEOMETRY_NONBLOCKING;
   std::expected<bool, Error> find_plate(std::size_t at_most_runs, const Eigen::Vector3d& hint,
                                         const PlateRunSettings& settings) MOLDLOFT_GEOMETRY_NONBLOCKING;
+  bool walks() const MOLDLOFT_GEOMETRY_NONBLOCKING {
+    return walking_ || walks_.empty();
+  }                                                       // cut_stripes() walks next
   bool describes() const MOLDLOFT_GEOMETRY_NONBLOCKING {  // find_plate() has come to the costlier half
     return stage_ == Stage::describe;
   }
@@ -95,7 +101,8 @@ class PlateRunFinder {
   double least_ = 0;  // distance of the hint to the nearest run so far
   struct Run;         // a stretch of good points on one stripe, linked into its region
 
-  bool cut_in_turn(std::size_t count, const PlateRunSettings&);  // false when there are too many runs
+  void begin_walks(std::size_t count, const PlateRunSettings&);
+  bool keep_walked(const PlateRunSettings&);
   void join_pieces(const StripeView&, const PlateRunSettings&);
   void drop_short_pieces(const StripeView&, std::size_t min_points, double min_length_mm);
   void trim_ends(const StripeView&, const PlateRunSettings&);
@@ -108,12 +115,16 @@ class PlateRunFinder {
   std::uint32_t region_of(std::uint32_t run) const;
 
   std::vector<std::uint32_t> good_;  // indices of good points, stripe after stripe; runs are stretches of it
-  std::vector<StripePiece> walked_;  // of the stripes that are walked in turn
+  std::vector<StripeWalk> walks_;    // of the stripes that are walked in turn, until their runs are made
+  bool walking_ = false;             // they have not come to their ends
+  std::vector<StripePiece> walked_;  // what they find
+  std::size_t kept_ = 0;             // of good_: where what is found begins
   std::vector<StripePiece> pieces_;  // of the stripe at hand
   std::vector<Run> runs_;            // of the whole frame, in order of stripe and y
   std::vector<std::uint32_t> first_run_;  // of every stripe, and one past the end
   std::vector<PlateRun> found_;
   std::size_t max_stripes_, max_points_;
+  Simd simd_;
 };
 
 }  // namespace moldloft::geometry

@@ -58,6 +58,11 @@ class HeightFilter {
   void restart(double y, double z) { y_ = y, level_ = z, slope_ = 0, count_ = 1; }
   double predict(double y) const { return level_ + slope_ * (y - y_); }
   int count() const { return count_; }
+  bool is_steady() const { return count_ == memory; }  // its gains do not change any more
+  double level() const { return level_; }
+  double slope() const { return slope_; }
+  // As update() would have left a steady filter.
+  void follow(double y, double level, double slope) { y_ = y, level_ = level, slope_ = slope; }
 
   void update(double y, double z, double spacing) {
     const double dy = y - y_, residual = z - predict(y);
@@ -69,12 +74,13 @@ class HeightFilter {
   }
 
   static constexpr double max_slope = 1.2;  // 50 degrees: steeper is a wall, not a plate
-
- private:
-  static constexpr int memory = 12;  // 2.4 mm: short against a plate's curvature, long against its noise
   struct Gains {
     double level, slope;
   };
+  static constexpr Gains steady_gains() { return gains[memory]; }
+
+ private:
+  static constexpr int memory = 12;  // 2.4 mm: short against a plate's curvature, long against its noise
   // By the number of points taken: two divisions less for every point of a frame.
   static constexpr std::array<Gains, memory + 1> gains = [] {
     std::array<Gains, memory + 1> table{};

@@ -1,12 +1,11 @@
 // One stripe walked from point to point and cut into pieces where its height leaves the line so far. One or
 // two points that leave it and come back are outliers and skipped.
 //
-// It goes in steps, because each step waits for the result of the one before (a division and a dozen
-// dependent operations in the filter): stripes walked in turn wait together, and two take little longer than
-// one.
+// What most points are, the next one on a smooth surface, is done for eight stripes at a time (stripe_kernel.hpp);
+// the first that is anything else is left to step().
 //
 // Units        mm
-// Cost         about 12 ns a point alone, 7 ns when two stripes go in turn
+// Cost         about 12 ns a point alone, 3 ns when eight stripes go in turn
 // Allocation   none; what is found goes where the constructor is told, one index a good point and one piece
 //              for every `fewest_piece_points` points and one more
 #pragma once
@@ -17,6 +16,7 @@
 #include <cstdint>
 
 #include "geometry/edges/plate_runs.hpp"
+#include "geometry/edges/stripe_kernel.hpp"
 #include "geometry/edges/stripe_line.hpp"
 
 namespace moldloft::geometry {
@@ -60,8 +60,11 @@ class StripeWalk {
     return true;
   }
 
-  std::uint32_t good_count() const { return good_count_; }
-  std::uint32_t piece_count() const { return piece_count_; }
+  // Walks at most eight stripes further, each by about `points`; true when all have come to their ends.
+  static bool walk_in_turn(std::span<StripeWalk> walks, const StripeKernel& kernel, std::size_t points);
+
+  std::span<const std::uint32_t> good() const { return {good_, good_count_}; }
+  std::span<const StripePiece> pieces() const { return {pieces_, piece_count_}; }
 
  private:
   // A height that differs from the line so far by more than this many standard deviations does not continue
@@ -127,6 +130,16 @@ class StripeWalk {
     filter_.update(y_[at_], z_[at_], spacing_);
     take(at_);
   }
+
+  // To the next point after which the line is steady; false when the stripe ends before.
+  bool step_until_steady() {
+    while (step()) {
+      if (filter_.is_steady()) return true;
+    }
+    return false;
+  }
+  void put_into(StripeLanes& lanes, std::size_t lane) const;
+  void take_from(const StripeLanes& lanes, std::size_t lane, std::span<const std::uint8_t> taken);
 
   const float *x_ = nullptr, *y_ = nullptr, *z_ = nullptr;
   std::size_t size_ = 0, at_ = 0;
