@@ -18,6 +18,11 @@ SteadyClock::SteadyClock() noexcept : start_{reading_of(CLOCK_MONOTONIC)} {}
 
 Instant SteadyClock::now() noexcept { return reading_of(CLOCK_MONOTONIC) - start_; }
 
+Instant SteadyClock::good_start() noexcept {
+  using std::chrono::milliseconds;
+  return std::chrono::ceil<milliseconds>(now() + start_) + std::chrono::microseconds{500} - start_;
+}
+
 Duration SteadyClock::thread_time() noexcept { return reading_of(CLOCK_THREAD_CPUTIME_ID); }
 
 void SteadyClock::sleep_until(Instant wake) noexcept {

@@ -24,6 +24,9 @@ class Clock {
   virtual Instant now() noexcept MOLDLOFT_NONBLOCKING = 0;
   virtual void sleep_until(Instant wake) noexcept = 0;  // returns at once when `wake` has passed
 
+  // An instant not far ahead at which something periodic should begin: now, where nothing else has its times.
+  virtual Instant good_start() noexcept MOLDLOFT_NONBLOCKING { return now(); }
+
   // What the calling thread has spent on the processor, from any origin: the difference of two readings, beside that of
   // now(), tells how long the thread was ready and did not run. Costs more than now(). Where time is not real nobody
   // is ever preempted.
@@ -41,6 +44,9 @@ class SteadyClock final : public Clock {
   Instant now() noexcept MOLDLOFT_NONBLOCKING override;
   void sleep_until(Instant wake) noexcept override;
   Duration thread_time() noexcept MOLDLOFT_NONBLOCKING override;
+  // The kernel does its own periodic work at whole multiples of 1, 4 or 10 ms of this clock, and whoever wakes then
+  // waits for it (5 us and more): within the next two milliseconds, half a one beside the whole.
+  Instant good_start() noexcept MOLDLOFT_NONBLOCKING override;
 
  private:
   Duration start_;

@@ -34,7 +34,7 @@ std::string_view Scheduler::name_of(int task) const {
 }
 
 void Scheduler::start() {
-  next_tick_ = clock_.now();
+  next_tick_ = clock_.good_start();
   spent_before_ = clock_.thread_time();
   number_ = 0;
   started_after_ = ticks_;

@@ -63,7 +63,8 @@ class Scheduler {
   int add(const TaskSpec& spec, Task& task);
   int add_background(const BackgroundSpec& spec, BackgroundTask& task);
 
-  void start();     // the first tick is due now; once more after a pause, which counts for nothing
+  void
+  start();  // the first tick is due at the clock's good_start(); once more after a pause, which counts for nothing
   bool run_tick();  // waits for the next tick and does it; false when the policy `stop` has ended the run
   void run_until(Instant end);
 
