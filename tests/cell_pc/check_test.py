@@ -12,20 +12,22 @@ import unittest
 
 CHECK = sys.argv.pop(1)
 
-# Of 5,000 samples 4,997 lie at 9 us or below, so 99.9 % do not exceed 9; the largest is 11.
+LATENCY = {"ours": {"p50_us": 7.5, "p99_us": 8.5, "p999_us": 9.6, "max_us": 33.0},
+           "cyclictest": {"p50_us": 7.0, "p99_us": 8.0, "p999_us": 8.0, "max_us": 11.0}, "missed": 0}
+
+# Of 5,000 samples 4,997 lie at 9 us or below, so 99.9 % do not exceed 9; the largest is 11. Half a microsecond more each.
 GOOD = {
     "cell.exit": 0,
     "cyclictest.json": {"thread": {"0": {"histogram": {"7": 3900, "8": 1080, "9": 17, "11": 3}, "cycles": 5000, "max": 11}}},
     "run/summary.json": {"result": "complete", "message": ""},
     "run/timing.json": {
         "tick_us": 1000.0, "missed_ticks": 0, "missed_by_cause": {},
-        "wake_up": {"p50_us": 7.7, "p99_us": 9.0, "p999_us": 10.7, "max_us": 33.0},
+        "wake_up": {"p50_us": 7.7, "p99_us": 9.0, "p999_us": 12.3, "max_us": 34.4},
         "environment": {"sysinfo": {"realtime": 1}},
         "setup": [{"what": "scheduling", "wanted": "SCHED_FIFO 50", "got": "SCHED_FIFO 50", "ok": True}],
     },
+    "latency.json": LATENCY,
 }
-LATENCY = {"ours": {"p50_us": 7.5, "p99_us": 8.5, "p999_us": 9.6, "max_us": 12.0},
-           "cyclictest": {"p50_us": 7.0, "p99_us": 8.0, "p999_us": 8.0, "max_us": 11.0}, "missed": 0}
 
 
 def write(folder, files):
@@ -55,7 +57,6 @@ class Gate(unittest.TestCase):
 
     def test_results_on_the_limits_pass(self):
         self.assertEqual(check(GOOD, GOOD), (0, []))
-        self.assertEqual(check(GOOD | {"latency.json": LATENCY}, GOOD | {"latency.json": LATENCY}), (0, []))
 
     def test_a_cell_that_did_not_complete(self):
         def held(files):
@@ -70,10 +71,12 @@ class Gate(unittest.TestCase):
         self.refuses(missed, "run: 1 missed ticks, {'computing': 1}; 0 allowed")
 
     def test_wake_up_later_than_the_limits(self):
-        def late(files): files["run/timing.json"]["wake_up"]["p999_us"] = 10.9
-        self.refuses(late, "run: wake-up p999_us 10.9, cyclictest 9.0: more than 1.2 times as much")
-        def once(files): files["run/timing.json"]["wake_up"]["max_us"] = 33.1
-        self.refuses(once, "run: wake-up max_us 33.1, cyclictest 11.0: more than 3.0 times as much")
+        def late(files): files["latency.json"]["ours"]["p999_us"] = 9.7
+        self.refuses(late, "latency: wake-up p999_us 9.7, cyclictest 8.0: more than 1.2 times as much")
+        def once(files): files["latency.json"]["ours"]["max_us"] = 33.1
+        self.refuses(once, "latency: wake-up max_us 33.1, cyclictest 11.0: more than 3.0 times as much")
+        def once_in_the_cell(files): files["run/timing.json"]["wake_up"]["max_us"] = 34.6
+        self.refuses(once_in_the_cell, "run: wake-up max_us 34.6, cyclictest 11.5: more than 3.0 times as much")
 
     def test_a_slower_tick_is_no_way_out(self):
         def slower(files): files["run/timing.json"]["tick_us"] = 2000.0
@@ -88,15 +91,12 @@ class Gate(unittest.TestCase):
         self.refuses(refused, "scheduling: SCHED_OTHER, wanted SCHED_FIFO 50")
 
     def test_runs_that_differ(self):
-        def apart(files): files["run/timing.json"]["wake_up"]["p99_us"] = 9.5
-        self.refuses(apart, "the two runs: run: wake-up p99_us 9.50 and 9.00: they differ by more than 5%", both=False)
-        def one_only(files): files["latency.json"] = LATENCY
-        self.refuses(one_only, "the two runs: latency: in one of the runs only", both=False)
+        def apart(files): files["latency.json"]["ours"]["p99_us"] = 9.0
+        self.refuses(apart, "the two runs: latency: wake-up p99_us 9.00 and 8.50: they differ by more than 5%", both=False)
 
-    def test_the_programs_own_comparison_counts_too(self):
-        def late(files): files["latency.json"] = LATENCY | {"ours": LATENCY["ours"] | {"p999_us": 9.7}, "missed": 2}
-        self.refuses(late, "latency: 2 missed ticks, {}; 0 allowed",
-                     "latency: wake-up p999_us 9.7, cyclictest 8.0: more than 1.2 times as much")
+    def test_a_missed_tick_of_the_self_test(self):
+        def missed(files): files["latency.json"]["missed"] = 2
+        self.refuses(missed, "latency: 2 missed ticks, {}; 0 allowed")
 
     def test_results_that_are_not_there(self):
         code, told = check(GOOD, {"cell.exit": 0})

@@ -215,11 +215,11 @@ TEST_CASE("without rights nothing is had, everything is said, and the process go
   CHECK(seen["memory lock"]["hint"].get<std::string>().starts_with(
       "the limit is 0 KiB: LimitMEMLOCK=infinity in "));
   CHECK(seen["scheduling"]["ok"] == false);
-  CHECK(seen["scheduling"]["wanted"] == "SCHED_FIFO 50");
+  CHECK(seen["scheduling"]["wanted"] == "SCHED_FIFO 60");
   CHECK(seen["scheduling"]["got"] == "SCHED_OTHER");
   CHECK(seen["scheduling"]["real_time"] == false);
   CHECK(seen["scheduling"]["hint"].get<std::string>().starts_with(
-      "Operation not permitted; the limit is 0: LimitRTPRIO=50 in the service unit, or rtprio 50 in "));
+      "Operation not permitted; the limit is 0: LimitRTPRIO=60 in the service unit, or rtprio 60 in "));
   CHECK(seen["scheduling now"] == "0 0");
   CHECK(seen["control stack"]["ok"] == true);  // needs no rights
   CHECK(seen["grown"] == "grown");
@@ -282,7 +282,7 @@ TEST_CASE("only the control thread is scheduled and pinned, not those before it,
     return j.dump();
   }));
   CAPTURE(seen.dump(1));
-  CHECK(seen["control"] == "1 50");
+  CHECK(seen["control"] == "1 60");
   CHECK(seen["its child"] == "0 0");
   CHECK(seen["beside"] == "0 0");
   CHECK(seen["main"] == "0 0");
@@ -374,7 +374,7 @@ TEST_CASE("a control thread that is never begun ends without its loop") {
 TEST_CASE("complaints are one line each: what, what there is, what was wanted, how to get it") {
   const SetupRows rows = {
       {.item = SetupItem::scheduling,
-       .wanted = "SCHED_FIFO 50",
+       .wanted = "SCHED_FIFO 60",
        .got = "SCHED_OTHER",
        .ok = false,
        .hint = "ask for it"},

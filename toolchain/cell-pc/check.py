@@ -2,7 +2,6 @@
 """The gate on the emulated cell PC: reads what two runs of run.sh left and fails unless they keep the limits.
 
     toolchain/cell-pc/check.py FIRST SECOND
-    toolchain/cell-pc/check.py --complete ONE       only that the cell completed under PREEMPT_RT with every setting as wanted
 
 Prints the figures of both beside their limits, then one line for each limit that is broken; the exit code is 1 when one is.
 """
@@ -12,27 +11,31 @@ import sys
 
 P999_TO_CYCLICTEST = 1.2  # the two wake in the same machine: ours may be later by the load of the cell, no more
 MAX_TO_CYCLICTEST = 3.0
-AGREEMENT = 0.05  # time counts instructions: two runs differ by when bytes cross the cable, not by the host's load
+AGREEMENT = 0.05  # time counts instructions, and the host's load is no part of it
 TICK_US = 1000.0
+
+# Where cyclictest takes turns with ours and nothing else runs. The whole cell shares its processor with the simulated
+# devices, whose bytes cross the cable when the emulator looks: it is held to no missed tick and to the maximum.
+SELF_TEST = "latency"
 
 
 def percentile(histogram, fraction):
     """Of cyclictest's histogram {"us": count}: the smallest value that so many samples do not exceed.
 
-    cyclictest rounds down to whole microseconds, so a limit taken from it is strict by up to one."""
+    cyclictest rounds down to whole microseconds: n counts as n + 0.5, as in moldloft latency."""
     samples = sorted((int(us), count) for us, count in histogram.items())
     wanted, seen = fraction * sum(count for _, count in samples), 0
     for us, count in samples:
         seen += count
         if seen >= wanted:
-            return float(us)
+            return us + 0.5
     raise ValueError("cyclictest took no sample")
 
 
 def cyclictest_alone(folder):
     thread = json.loads((folder / "cyclictest.json").read_text())["thread"]["0"]
     return {"p50_us": percentile(thread["histogram"], 0.5), "p99_us": percentile(thread["histogram"], 0.99),
-            "p999_us": percentile(thread["histogram"], 0.999), "max_us": float(thread["max"])}
+            "p999_us": percentile(thread["histogram"], 0.999), "max_us": thread["max"] + 0.5}
 
 
 def read(folder):
@@ -42,10 +45,9 @@ def read(folder):
              "timing": json.loads((run / "timing.json").read_text())}
     found["waking"] = {"run": found["timing"]["wake_up"] | {"missed": found["timing"]["missed_ticks"]}}
     found["cyclictest"] = {"run": cyclictest_alone(folder)}
-    if (folder / "latency.json").exists():  # the program's own comparison, made in the same machine
-        latency = json.loads((folder / "latency.json").read_text())
-        found["waking"]["latency"] = latency["ours"] | {"missed": latency["missed"]}
-        found["cyclictest"]["latency"] = latency["cyclictest"]
+    latency = json.loads((folder / "latency.json").read_text())  # the program's own comparison, in the same machine
+    found["waking"]["latency"] = latency["ours"] | {"missed": latency["missed"]}
+    found["cyclictest"]["latency"] = latency["cyclictest"]
     return found
 
 
@@ -75,21 +77,20 @@ def faults_of_waking(found):
         other = found["cyclictest"][source]
         if ours["missed"] != 0:
             yield f"{source}: {ours['missed']} missed ticks, {timing.get('missed_by_cause')}; 0 allowed"
-        for key, limit in (("p999_us", P999_TO_CYCLICTEST), ("max_us", MAX_TO_CYCLICTEST)):
+        limits = [("max_us", MAX_TO_CYCLICTEST)]
+        if source == SELF_TEST:
+            limits.insert(0, ("p999_us", P999_TO_CYCLICTEST))
+        for key, limit in limits:
             if ours[key] > limit * other[key]:
                 yield f"{source}: wake-up {key} {ours[key]:.1f}, cyclictest {other[key]:.1f}: more than {limit} times as much"
 
 
 def disagreements(first, second):
-    for source, ours in first["waking"].items():
-        theirs = second["waking"].get(source)
-        if theirs is None:
-            yield f"{source}: in one of the runs only"
-            continue
-        for key in ("p50_us", "p99_us", "p999_us"):
-            low, high = sorted((ours[key], theirs[key]))
-            if high > low * (1 + AGREEMENT):
-                yield f"{source}: wake-up {key} {ours[key]:.2f} and {theirs[key]:.2f}: they differ by more than {AGREEMENT:.0%}"
+    ours, theirs = first["waking"][SELF_TEST], second["waking"][SELF_TEST]
+    for key in ("p50_us", "p99_us", "p999_us"):
+        low, high = sorted((ours[key], theirs[key]))
+        if high > low * (1 + AGREEMENT):
+            yield f"{SELF_TEST}: wake-up {key} {ours[key]:.2f} and {theirs[key]:.2f}: they differ by more than {AGREEMENT:.0%}"
 
 
 def table(runs):
@@ -102,20 +103,17 @@ def table(runs):
 
 
 def main(arguments):
-    complete = arguments[:1] == ["--complete"]
     if len(arguments) != 2:
         print(__doc__, file=sys.stderr)
         return 1
     try:
-        runs = [read(folder) for folder in (arguments[1:] if complete else arguments)]
+        runs = [read(folder) for folder in arguments]
     except (OSError, ValueError, KeyError) as missing:
         print(f"cell-pc: the results cannot be read: {missing}", file=sys.stderr)
         return 1
     print("\n".join(table(runs)))
-    look = faults_of_the_cell if complete else faults_of
-    faults = [f"run {number}: {fault}" for number, found in enumerate(runs, 1) for fault in look(found)]
-    if not complete:
-        faults += [f"the two runs: {fault}" for fault in disagreements(*runs)]
+    faults = [f"run {number}: {fault}" for number, found in enumerate(runs, 1) for fault in faults_of(found)]
+    faults += [f"the two runs: {fault}" for fault in disagreements(*runs)]
     for fault in faults:
         print(f"cell-pc: {fault}", file=sys.stderr)
     return 1 if faults else 0

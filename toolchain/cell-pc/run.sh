@@ -6,7 +6,7 @@
 #
 # --build   the build tree with moldloft and moldloft-sim; default build/release
 # --out     where the results go; default build/cell-pc/results
-# --jobs    in this order: cyclictest, cell, latency; default all that the program knows
+# --jobs    in this order: cyclictest, cell, latency; default all three
 # --cpu     QEMU's model of the processor
 # --limit   seconds of this machine's time after which the emulator is ended
 # what follows -- goes to moldloft-sim devices, such as --plate dome --seed 7
@@ -15,7 +15,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-build=build/release out=build/cell-pc/results jobs= cpu=max limit=900
+build=build/release out=build/cell-pc/results jobs= cpu=max,-erms,-fsrm limit=900
 while [ $# -gt 0 ]; do
   case $1 in
     --build) build=$2 ;;
