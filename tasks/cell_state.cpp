@@ -11,7 +11,7 @@ using A = CellAction;
 constexpr auto any = always<CellContext>;
 
 // Held since the start: nothing is connected, nothing calibrated, nothing to go on with yet.
-constexpr bool not_begun(const CellContext& c) { return !c.begun; }
+constexpr bool not_begun(const CellContext& c) MOLDLOFT_NONBLOCKING { return !c.begun; }
 
 // clang-format off
 constexpr CellTransition table[] = {

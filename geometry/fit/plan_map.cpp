@@ -59,10 +59,15 @@ PlanMap::PlanMap(int spans) {
   along_v_.reserve(pieces);
 }
 
-PlanMap::PlanMap(const Outline& outline) { assign(outline); }
+PlanMap::PlanMap(const Outline& outline) : outline_{outline} { tabulate(); }
 
 void PlanMap::assign(const Outline& outline) {
   outline_ = outline;
+  tabulate();
+}
+
+// The sides as polynomials, span by span.
+void PlanMap::tabulate() {
   const std::vector<double>& knots = outline_.sides[0].knots;
   const int spans = static_cast<int>(knots.size()) - 2 * cubic - 1;
   along_u_.resize(spans);

@@ -64,6 +64,7 @@ class PlanMap {
   void to_net(BSplineSurface& surface) const;
 
  private:
+  void tabulate();
   // One span of two opposite sides as polynomials in the span's own coordinate, power basis.
   struct SpanPair {
     double coefficient[4][4];  // [low x, low y, high x, high y][power]

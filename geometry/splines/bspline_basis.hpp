@@ -23,14 +23,14 @@ namespace moldloft::geometry {
 struct BasisValues {
   std::array<double, 4> value, first, second;
 };
-BasisValues cubic_basis(std::span<const double> knots, int k, double t);
+BasisValues cubic_basis(std::span<const double> knots, int k, double t) MOLDLOFT_GEOMETRY_NONBLOCKING;
 
 // Any degree: values[i] = N_{k-p+i}(t), i = 0..p; `values` has room for p + 1.
 void basis_functions(std::span<const double> knots, int degree, int k, double t, std::span<double> values);
 
 // values[m * (p + 1) + i] = the m-th derivative of N_{k-p+i} at t, m = 0..orders.
 void basis_derivatives(std::span<const double> knots, int degree, int k, double t, int orders,
-                       std::span<double> values);
+                       std::span<double> values) MOLDLOFT_GEOMETRY_NONBLOCKING;
 
 // The spline's piece on span k, cut to [a, b] within the span, in Bernstein form (thesis eq. 3.6 and
 // 3.20-3.34 in one): M with N_{k-p+i}(a + (b - a) t) = sum_l M(i, l) B_l^p(t), rows i, columns l, both 0..p.

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "geometry/error.hpp"
+#include "geometry/nonblocking.hpp"
 
 namespace moldloft::geometry {
 
@@ -65,7 +66,7 @@ std::vector<double> balanced_knots(std::span<const double> parameters, int contr
                                    int degree = cubic);
 
 // How find_span() looks when the span is not where uniform knots would have it.
-int search_span(std::span<const double> knots, double t, int degree);
+int search_span(std::span<const double> knots, double t, int degree) MOLDLOFT_GEOMETRY_NONBLOCKING;
 
 inline int find_span(std::span<const double> knots, double t, int degree) {
   const double* k = knots.data();

@@ -11,7 +11,7 @@ toolchain/aarch64/sysroot.sh
 tests=("$@")
 [ ${#tests[@]} -gt 0 ] || tests=(test_hal test_tasks test_firmware_like test_host_sim)
 
-cmake --preset aarch64 -D MOLDLOFT_TESTS=ON >/dev/null
+cmake --preset aarch64 -D MOLDLOFT_TESTS=ON -D MOLDLOFT_GEOMETRY_ONLY=OFF >/dev/null
 cmake --build --preset aarch64 --target moldloft "${tests[@]}"
 (cd build/aarch64 && DPKG_ADMINDIR=$PWD/../aarch64-sysroot/var/lib/dpkg cpack -B . | grep generated)
 

@@ -2,12 +2,15 @@
 # Boots the emulated cell PC, has it do the jobs, and leaves their results in a folder. README.md beside this file says what
 # the machine is and what its figures are worth.
 #
-#     toolchain/cell-pc/run.sh [--build DIR] [--out DIR] [--jobs cyclictest,cell] [--cpu max] [--limit SECONDS] [-- DEVICES...]
+#     toolchain/cell-pc/run.sh [--build DIR] [--out DIR] [--jobs cyclictest,cell] [--cpu max] [--limit SECONDS]
+#                              [--kernel PACKAGE] [--realtime 'KEY = VALUE'] [-- DEVICES...]
 #
 # --build   the build tree with moldloft and moldloft-sim; default build/release
 # --out     where the results go; default build/cell-pc/results
 # --jobs    in this order: cyclictest, cell, latency; default all three
 # --cpu     QEMU's model of the processor
+# --kernel  linux-image-rt-amd64 (default), or linux-image-amd64: what an ordinary one makes of it
+# --realtime  one line of [realtime] for the cell's configuration, such as 'priority = 0'
 # --limit   seconds of this machine's time after which the emulator is ended
 # what follows -- goes to moldloft-sim devices, such as --plate dome --seed 7
 #
@@ -15,7 +18,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-build=build/release out=build/cell-pc/results jobs= cpu=max,-erms,-fsrm limit=900
+build=build/release out=build/cell-pc/results jobs= cpu=max,-erms,-fsrm limit=900 kernel_package=linux-image-rt-amd64 realtime=
 while [ $# -gt 0 ]; do
   case $1 in
     --build) build=$2 ;;
@@ -23,6 +26,8 @@ while [ $# -gt 0 ]; do
     --jobs) jobs=$2 ;;
     --cpu) cpu=$2 ;;
     --limit) limit=$2 ;;
+    --kernel) kernel_package=$2 ;;
+    --realtime) realtime=$2 ;;
     --) shift; break ;;
     *) echo "cell-pc: $1 is no option; the head of $0 names them" >&2; exit 1 ;;
   esac
@@ -45,11 +50,11 @@ end() {
 }
 trap end EXIT
 
-# The distribution's own PREEMPT_RT kernel, taken out of its package; nothing is installed on this machine.
+# The distribution's own kernel, taken out of its package; nothing is installed on this machine.
 kernel_of_the_distribution() {
   local package
-  package=$(apt-cache depends linux-image-rt-amd64 2>/dev/null | sed -n 's/^ *Depends: \(linux-image-.*-rt-amd64\)$/\1/p' | head -1)
-  [ -n "$package" ] || cannot "apt knows no linux-image-rt-amd64; is its list of packages there (apt-get update)?"
+  package=$(apt-cache depends "$kernel_package" 2>/dev/null | sed -n 's/^ *Depends: \(linux-image-[0-9].*-amd64\)$/\1/p' | head -1)
+  [ -n "$package" ] || cannot "apt knows no $kernel_package; is its list of packages there (apt-get update)?"
   kernel=build/cell-pc/$package/vmlinuz
   [ -f "$kernel" ] && return
   echo "cell-pc: fetching $package"
@@ -69,7 +74,7 @@ make_root() {
   cp "$(command -v cyclictest)" "$root/usr/bin/"
   cp "$(command -v busybox)" "$root/bin/busybox"
   install -m 755 toolchain/cell-pc/init "$root/init"
-  printf '%s\n' "jobs='$jobs'" "devices='${devices[*]}'" >"$root/etc/cell-pc.conf"
+  printf '%s\n' "jobs='$jobs'" "devices='${devices[*]}'" "realtime='$realtime'" >"$root/etc/cell-pc.conf"
   for library in $(ldd "$root"/usr/bin/* | grep -o '/[^ ]*\.so[^ ]*' | sort -u); do
     install -D -m 755 "$library" "$root$library"
   done
