@@ -14,6 +14,9 @@ tests=("$@")
 cmake --preset aarch64 -D MOLDLOFT_TESTS=ON -D MOLDLOFT_GEOMETRY_ONLY=OFF >/dev/null
 cmake --build --preset aarch64 --target moldloft "${tests[@]}"
 (cd build/aarch64 && DPKG_ADMINDIR=$PWD/../aarch64-sysroot/var/lib/dpkg cpack -B . | grep generated)
+depends=$(dpkg-deb -f build/aarch64/moldloft_*_arm64.deb Depends)
+[[ $depends == *libc6* ]] || { echo "aarch64: the package names no libraries that it needs: '$depends'" >&2; exit 1; }
+echo "depends: $depends"
 
 # Programs that start programs (the deployed controller on real links) need the kernel to run arm64 files by itself:
 # qemu-user-static registers that. Without it those cases fail here and say so.

@@ -22,16 +22,19 @@ apt-get "${options[@]}" --yes --no-install-recommends --download-only install "$
 
 # dpkg's own notes on each package come along: from them dpkg-shlibdeps knows which package a library belongs to.
 database=$sysroot/var/lib/dpkg
+# Notes of a package that may be there for several architectures carry this one in their name: format 1.
+echo 1 >"$database/info/format"
 for package in "$apt"/cache/archives/*.deb; do
   dpkg-deb -x "$package" "$sysroot"
   name=$(dpkg-deb -f "$package" Package)
+  [ "$(dpkg-deb -f "$package" Multi-Arch)" = same ] && name=$name:arm64
   { echo "Status: install ok installed"; dpkg-deb -f "$package"; echo; } >>"$database/status"
   notes=$apt/notes
   rm -rf "$notes" && dpkg-deb -e "$package" "$notes"
   for note in symbols shlibs; do
-    [ -f "$notes/$note" ] && cp "$notes/$note" "$database/info/$name:arm64.$note"
+    [ -f "$notes/$note" ] && cp "$notes/$note" "$database/info/$name.$note"
   done
-  (cd "$sysroot" && dpkg-deb --fsys-tarfile "$package" | tar -t | sed "s#^\.#$sysroot#; s#/\$##") >"$database/info/$name:arm64.list"
+  (cd "$sysroot" && dpkg-deb --fsys-tarfile "$package" | tar -t | sed "s#^\.#$sysroot#; s#/\$##") >"$database/info/$name.list"
 done
 rm -rf "$apt"
 touch "$sysroot/.complete"
