@@ -380,5 +380,5 @@ TEST_CASE("complaints are one line each: what, what there is, what was wanted, h
        .hint = "ask for it"},
       {.item = SetupItem::affinity, .wanted = "CPU 1", .got = "CPU 1", .ok = true, .hint = ""}};
   CHECK(complaints(rows) ==
-        std::vector<std::string>{"scheduling: SCHED_OTHER, wanted SCHED_FIFO 50: ask for it"});
+        std::vector<std::string>{"scheduling: SCHED_OTHER, wanted SCHED_FIFO 60: ask for it"});
 }

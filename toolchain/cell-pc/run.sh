@@ -61,7 +61,8 @@ kernel_of_the_distribution() {
   (cd "$scratch" && apt-get download "$package" >/dev/null 2>&1) || cannot "$package cannot be downloaded"
   dpkg-deb --fsys-tarfile "$scratch"/linux-image-*.deb | tar -x -C "$scratch" --wildcards './boot/vmlinuz-*'
   mkdir -p "$(dirname "$kernel")"
-  mv "$scratch"/boot/vmlinuz-* "$kernel.new" && mv "$kernel.new" "$kernel"  # two that fetch at once do not meet halfway
+  # Two that fetch at once do not meet halfway: each has a file of its own until it is whole.
+  mv "$scratch"/boot/vmlinuz-* "$kernel.$$" && mv "$kernel.$$" "$kernel"
 }
 
 # The root of the PC: the package as dpkg unpacks it, and beside it what does not ship: the simulated devices.
