@@ -1,7 +1,8 @@
 // Which vector instructions a kernel may use: one binary carries every variant, and the machine picks at
 // run time.
 //
-// A kernel is written once, in a .inc file, on the compiler's vector extension, and included once a variant:
+// A kernel is written once, in a .inc file, on the compiler's vector extension, and included once a variant by
+// simd_variants.inc, which sets
 //     MOLDLOFT_SIMD_LANES   doubles in a vector: 2, 4, 8
 //     MOLDLOFT_SIMD_TARGET  the attribute that every function of the file carries
 //     MOLDLOFT_SIMD_NAME    the namespace it lands in

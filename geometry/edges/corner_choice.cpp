@@ -16,8 +16,8 @@ constexpr std::size_t ring_capacity = 2048;
 constexpr std::size_t fewest_points = 8;  // of a branch
 constexpr int rounds = 3;                 // a candidate is moved to where its lines meet and looked at again
 constexpr int divisions = 4;              // of a ring's points between the two branches
-constexpr std::size_t points_a_step =
-    4096;  // of the edge; a ring's points cost more and are at most half as many
+// Of the edge; a ring's points cost more and are at most half as many.
+constexpr std::size_t points_a_step = 4096;
 
 double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 

@@ -82,9 +82,8 @@ class PlateRunFinder {
                                          const PlateRunSettings& settings) MOLDLOFT_GEOMETRY_NONBLOCKING;
   std::expected<bool, Error> find_plate(std::size_t at_most_runs, const Eigen::Vector3d& hint,
                                         const PlateRunSettings& settings) MOLDLOFT_GEOMETRY_NONBLOCKING;
-  bool walks() const MOLDLOFT_GEOMETRY_NONBLOCKING {
-    return walking_ || walks_.empty();
-  }                                                       // cut_stripes() walks next
+  // cut_stripes() walks next, which is the costlier half.
+  bool walks() const MOLDLOFT_GEOMETRY_NONBLOCKING { return walking_ || walks_.empty(); }
   bool describes() const MOLDLOFT_GEOMETRY_NONBLOCKING {  // find_plate() has come to the costlier half
     return stage_ == Stage::describe;
   }

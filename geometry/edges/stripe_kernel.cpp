@@ -2,28 +2,9 @@
 
 #include <cassert>
 
-#define MOLDLOFT_SIMD_NAME portable_stripe
-#define MOLDLOFT_SIMD_LANES 2
-#define MOLDLOFT_SIMD_TARGET
-#include "geometry/edges/stripe_kernel.inc"
-#undef MOLDLOFT_SIMD_NAME
-#undef MOLDLOFT_SIMD_LANES
-#undef MOLDLOFT_SIMD_TARGET
-
-#if defined(__x86_64__)
-#define MOLDLOFT_SIMD_NAME avx2_stripe
-#define MOLDLOFT_SIMD_LANES 4
-#define MOLDLOFT_SIMD_TARGET MOLDLOFT_TARGET_AVX2
-#include "geometry/edges/stripe_kernel.inc"
-#undef MOLDLOFT_SIMD_NAME
-#undef MOLDLOFT_SIMD_LANES
-#undef MOLDLOFT_SIMD_TARGET
-
-#define MOLDLOFT_SIMD_NAME avx512_stripe
-#define MOLDLOFT_SIMD_LANES 8
-#define MOLDLOFT_SIMD_TARGET MOLDLOFT_TARGET_AVX512
-#include "geometry/edges/stripe_kernel.inc"
-#endif
+#define MOLDLOFT_SIMD_KERNEL stripe
+#define MOLDLOFT_SIMD_FILE "geometry/edges/stripe_kernel.inc"
+#include "geometry/simd_variants.inc"
 
 namespace moldloft::geometry {
 

@@ -11,8 +11,8 @@ void StripeWalk::put_into(StripeLanes& lanes, std::size_t lane) const {
 void StripeWalk::take_from(const StripeLanes& lanes, std::size_t lane, std::span<const std::uint8_t> taken) {
   std::uint32_t end = good_count_, point = static_cast<std::uint32_t>(at_);
   for (const std::uint8_t lanes_taken : taken) {
-    good_[end] =
-        ++point;  // counts only when it is there: there is room, for no stripe has more good points than points
+    // Counts only when it was there. There is room: no stripe has more good points than points.
+    good_[end] = ++point;
     end += lanes_taken >> lane & 1;
   }
   pieces_[piece_count_ - 1].count += end - good_count_;

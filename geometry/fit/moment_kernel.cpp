@@ -45,28 +45,9 @@ constexpr auto& half3_columns = halves3.columns;
 
 }  // namespace moldloft::geometry
 
-#define MOLDLOFT_SIMD_NAME portable_kernel
-#define MOLDLOFT_SIMD_LANES 2
-#define MOLDLOFT_SIMD_TARGET
-#include "geometry/fit/moment_kernel.inc"
-#undef MOLDLOFT_SIMD_NAME
-#undef MOLDLOFT_SIMD_LANES
-#undef MOLDLOFT_SIMD_TARGET
-
-#if defined(__x86_64__)
-#define MOLDLOFT_SIMD_NAME avx2_kernel
-#define MOLDLOFT_SIMD_LANES 4
-#define MOLDLOFT_SIMD_TARGET MOLDLOFT_TARGET_AVX2
-#include "geometry/fit/moment_kernel.inc"
-#undef MOLDLOFT_SIMD_NAME
-#undef MOLDLOFT_SIMD_LANES
-#undef MOLDLOFT_SIMD_TARGET
-
-#define MOLDLOFT_SIMD_NAME avx512_kernel
-#define MOLDLOFT_SIMD_LANES 8
-#define MOLDLOFT_SIMD_TARGET MOLDLOFT_TARGET_AVX512
-#include "geometry/fit/moment_kernel.inc"
-#endif
+#define MOLDLOFT_SIMD_KERNEL kernel
+#define MOLDLOFT_SIMD_FILE "geometry/fit/moment_kernel.inc"
+#include "geometry/simd_variants.inc"
 
 namespace moldloft::geometry {
 

@@ -2,28 +2,9 @@
 
 #include <cassert>
 
-#define MOLDLOFT_SIMD_NAME portable_plan_map
-#define MOLDLOFT_SIMD_LANES 2
-#define MOLDLOFT_SIMD_TARGET
-#include "geometry/fit/plan_map_kernel.inc"
-#undef MOLDLOFT_SIMD_NAME
-#undef MOLDLOFT_SIMD_LANES
-#undef MOLDLOFT_SIMD_TARGET
-
-#if defined(__x86_64__)
-#define MOLDLOFT_SIMD_NAME avx2_plan_map
-#define MOLDLOFT_SIMD_LANES 4
-#define MOLDLOFT_SIMD_TARGET MOLDLOFT_TARGET_AVX2
-#include "geometry/fit/plan_map_kernel.inc"
-#undef MOLDLOFT_SIMD_NAME
-#undef MOLDLOFT_SIMD_LANES
-#undef MOLDLOFT_SIMD_TARGET
-
-#define MOLDLOFT_SIMD_NAME avx512_plan_map
-#define MOLDLOFT_SIMD_LANES 8
-#define MOLDLOFT_SIMD_TARGET MOLDLOFT_TARGET_AVX512
-#include "geometry/fit/plan_map_kernel.inc"
-#endif
+#define MOLDLOFT_SIMD_KERNEL plan_map
+#define MOLDLOFT_SIMD_FILE "geometry/fit/plan_map_kernel.inc"
+#include "geometry/simd_variants.inc"
 
 namespace moldloft::geometry {
 

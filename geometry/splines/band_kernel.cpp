@@ -3,28 +3,9 @@
 #include <cassert>
 #include <cfloat>
 
-#define MOLDLOFT_SIMD_NAME portable_band
-#define MOLDLOFT_SIMD_LANES 2
-#define MOLDLOFT_SIMD_TARGET
-#include "geometry/splines/band_kernel.inc"
-#undef MOLDLOFT_SIMD_NAME
-#undef MOLDLOFT_SIMD_LANES
-#undef MOLDLOFT_SIMD_TARGET
-
-#if defined(__x86_64__)
-#define MOLDLOFT_SIMD_NAME avx2_band
-#define MOLDLOFT_SIMD_LANES 4
-#define MOLDLOFT_SIMD_TARGET MOLDLOFT_TARGET_AVX2
-#include "geometry/splines/band_kernel.inc"
-#undef MOLDLOFT_SIMD_NAME
-#undef MOLDLOFT_SIMD_LANES
-#undef MOLDLOFT_SIMD_TARGET
-
-#define MOLDLOFT_SIMD_NAME avx512_band
-#define MOLDLOFT_SIMD_LANES 8
-#define MOLDLOFT_SIMD_TARGET MOLDLOFT_TARGET_AVX512
-#include "geometry/splines/band_kernel.inc"
-#endif
+#define MOLDLOFT_SIMD_KERNEL band
+#define MOLDLOFT_SIMD_FILE "geometry/splines/band_kernel.inc"
+#include "geometry/simd_variants.inc"
 
 namespace moldloft::geometry {
 

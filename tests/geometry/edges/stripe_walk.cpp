@@ -73,6 +73,20 @@ Walked alone(const Stripe& s) {
   return result;
 }
 
+// In pieces of `points`, which end anywhere, also in the middle of what interrupts a line.
+void check_together_as_alone(const std::vector<Stripe>& stripes, Simd simd, std::size_t points) {
+  std::vector<Walked> results(stripes.begin(), stripes.end());
+  std::vector<StripeWalk> walks;
+  for (std::size_t k = 0; k < stripes.size(); ++k) walks.push_back(results[k].begin(stripes[k]));
+  while (!StripeWalk::walk_in_turn(walks, stripe_kernel(simd), points)) {
+  }
+  for (std::size_t k = 0; k < stripes.size(); ++k) {
+    CAPTURE(k);
+    results[k].end(walks[k]);
+    CHECK(results[k] == alone(stripes[k]));
+  }
+}
+
 }  // namespace
 
 TEST_CASE("stripes walked eight at a time are cut as each of them alone would be") {
@@ -86,30 +100,19 @@ TEST_CASE("stripes walked eight at a time are cut as each of them alone would be
   for (unsigned seed = 0; seed < 40; ++seed) {
     CAPTURE(seed);
     std::vector<Stripe> stripes;
-    std::vector<Walked> truth;
     const std::size_t count = 1 + seed % 8;
     for (std::size_t k = 0; k < count; ++k) {
       // As long as a frame's, and as short as what a shadow leaves.
       const std::size_t points = seed % 4 == 3 ? (seed + 7 * k) % 30 : 480 + (seed * 13 + k * 5) % 40;
       stripes.push_back(
           stripe(points, kinds[(seed + k) % std::size(kinds)], 100 * seed + static_cast<unsigned>(k)));
-      truth.push_back(alone(stripes.back()));
-      good += truth.back().good.size(), pieces += truth.back().pieces.size();
+      const Walked truth = alone(stripes.back());
+      good += truth.good.size(), pieces += truth.pieces.size();
     }
     for (const Simd simd : every_simd) {
       if (!machine_has(simd)) continue;
       CAPTURE(to_string(simd));
-      std::vector<Walked> results(stripes.begin(), stripes.end());
-      std::vector<StripeWalk> walks;
-      for (std::size_t k = 0; k < count; ++k) walks.push_back(results[k].begin(stripes[k]));
-      // In pieces that end anywhere, also in the middle of what interrupts the line.
-      while (!StripeWalk::walk_in_turn(walks, stripe_kernel(simd), 1 + seed % 50)) {
-      }
-      for (std::size_t k = 0; k < count; ++k) {
-        CAPTURE(k);
-        results[k].end(walks[k]);
-        CHECK(results[k] == truth[k]);
-      }
+      check_together_as_alone(stripes, simd, 1 + seed % 50);
     }
   }
   // The stripes must have had both: long smooth stretches, and what interrupts them.
@@ -122,7 +125,6 @@ TEST_CASE("a steady line leaves a walk in the state that it would have had alone
   // eight.
   for (unsigned seed = 0; seed < 200; ++seed) {
     std::vector<Stripe> stripes;
-    std::vector<Walked> results;
     for (std::size_t k = 0; k < 8; ++k) {
       Stripe s =
           stripe(300, {.backwards = 1, .gaps = 1, .bend = 0.02 * static_cast<double>(k), .uneven = true},
@@ -132,15 +134,7 @@ TEST_CASE("a steady line leaves a walk in the state that it would have had alone
       for (std::size_t i = 20 + k; i < 300; i += 17) s.z[i] += near_limit(random);
       stripes.push_back(s);
     }
-    for (const Stripe& s : stripes) results.emplace_back(s);
-    std::vector<StripeWalk> walks;
-    for (std::size_t k = 0; k < 8; ++k) walks.push_back(results[k].begin(stripes[k]));
-    while (!StripeWalk::walk_in_turn(walks, stripe_kernel(), 100)) {
-    }
-    for (std::size_t k = 0; k < 8; ++k) {
-      results[k].end(walks[k]);
-      CHECK(results[k] == alone(stripes[k]));
-    }
+    check_together_as_alone(stripes, widest_simd(), 100);
   }
 }
 
@@ -148,7 +142,6 @@ TEST_CASE("a point at the limit of what goes on is in or out for eight stripes a
   // Flat and without noise, so that the distance from the line is the height: 0.28 mm of noise, 0.1 a millimetre of way
   // and 0.01 a square millimetre of bend are allowed, and nothing less for a step backwards.
   std::vector<Stripe> stripes(8);
-  std::vector<Walked> results;
   std::size_t good = 0;
   for (std::size_t k = 0; k < 8; ++k) {
     double y = 0;
@@ -161,17 +154,9 @@ TEST_CASE("a point at the limit of what goes on is in or out for eight stripes a
       stripes[k].x.push_back(0), stripes[k].y.push_back(static_cast<float>(y));
       stripes[k].z.push_back(static_cast<float>(z));
     }
-    results.emplace_back(stripes[k]);
     good += alone(stripes[k]).good.size();
   }
   CHECK(good < 800 - 2);  // some are out ...
   CHECK(good > 784 + 2);  // ... and some are in
-  std::vector<StripeWalk> walks;
-  for (std::size_t k = 0; k < 8; ++k) walks.push_back(results[k].begin(stripes[k]));
-  while (!StripeWalk::walk_in_turn(walks, stripe_kernel(), 100)) {
-  }
-  for (std::size_t k = 0; k < 8; ++k) {
-    results[k].end(walks[k]);
-    CHECK(results[k] == alone(stripes[k]));
-  }
+  check_together_as_alone(stripes, widest_simd(), 100);
 }
