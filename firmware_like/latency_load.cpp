@@ -163,6 +163,7 @@ void LatencyLoad::frame_arrived(hal::Instant now) {
   }
   packed_ = *begun;
   unpacked_ = 0;
+  hal::psc1::decode_intensities(payload(), *begun, decoded_);
   ++frames_;
   const auto received = recorder_.offset(hal::LinkId::scanner, hal::Direction::received);
   recorder_.shot({.at = now,

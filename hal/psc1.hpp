@@ -169,8 +169,14 @@ std::expected<void, Flaw> decode_frame(std::span<const std::byte> payload,
 // The same in pieces: everything but the points, which is where all that can be wrong lies, ...
 std::expected<FrameHead, Flaw> begin_frame(std::span<const std::byte> payload,
                                            Frame& frame) noexcept MOLDLOFT_NONBLOCKING;
-// ... then points `first` to `end` - 1 of the same payload: 2 ns a point.
+// ... then the coordinates of points `first` to `end` - 1 of the same payload, 2 ns a point, ...
 void decode_points(std::span<const std::byte> payload, const FrameHead&, std::size_t first, std::size_t end,
                    Frame& frame) noexcept MOLDLOFT_NONBLOCKING;
+// ... and the intensities of all points, 0 where none are sent.
+void decode_intensities(std::span<const std::byte> payload, const FrameHead&,
+                        Frame& frame) noexcept MOLDLOFT_NONBLOCKING;
+// Of a payload that is still on its way: how many points, from the first, have all coordinates among its first
+// `have` bytes. Nothing before these points' bytes is missing then.
+std::size_t points_within(std::size_t have, const FrameHead&) noexcept MOLDLOFT_NONBLOCKING;
 
 }  // namespace moldloft::hal::psc1

@@ -276,16 +276,27 @@ void decode_points(std::span<const std::byte> payload, const FrameHead& head, st
   } else {
     decode_columns<float>(columns.data(), head, first, end, frame);
   }
-  const auto intensity = std::span{frame.intensity}.subspan(first, end - first);
-  if (!head.intensity) return std::ranges::fill(intensity, std::uint8_t{0}), void();
-  if (!intensity.empty())
-    std::memcpy(intensity.data(), columns.last(head.point_count).data() + first, intensity.size());
+}
+
+void decode_intensities(std::span<const std::byte> payload, const FrameHead& head, Frame& frame) noexcept {
+  const auto intensities = std::span{frame.intensity}.first(head.point_count);
+  if (!head.intensity) return std::ranges::fill(intensities, std::uint8_t{0}), void();
+  if (!intensities.empty())
+    std::memcpy(intensities.data(), payload.last(head.point_count).data(), intensities.size());
+}
+
+std::size_t points_within(std::size_t have, const FrameHead& head) noexcept {
+  const std::size_t size = value_size(head.encoding), points = head.point_count;
+  const std::size_t heights =
+      head_size + head.stripe_count * stripe_size + 2 * points * size;  // where they begin
+  return have <= heights ? 0 : std::min(points, (have - heights) / size);
 }
 
 std::expected<void, Flaw> decode_frame(std::span<const std::byte> payload, Frame& frame) noexcept {
   const auto head = begin_frame(payload, frame);
   if (!head) return std::unexpected{head.error()};
   decode_points(payload, *head, 0, head->point_count, frame);
+  decode_intensities(payload, *head, frame);
   return {};
 }
 

@@ -133,6 +133,7 @@ void PscScanner::open_link(Instant now) {
 
 void PscScanner::back_off(Instant now) {
   link_.close();
+  drop_arriving();
   ask_again_at_.reset();
   back_off_ = back_off_ == 0ns ? settings_.first_back_off : std::min(2 * back_off_, settings_.last_back_off);
   wait_until_ = now + back_off_;
@@ -205,11 +206,15 @@ void PscScanner::report_both(Instant now) {
 
 void PscScanner::fail_shot(Instant) {
   shot_.outstanding = false;
+  drop_arriving();
   ask_again_at_.reset();
   events_.push({ScannerEvent::Kind::shot_failed, shot_.id, failure_});
 }
 
-void PscScanner::drop_shot(Instant) { ask_again_at_.reset(); }
+void PscScanner::drop_shot(Instant) {
+  ask_again_at_.reset();
+  drop_arriving();
+}
 
 // ---- what arrives
 
@@ -224,7 +229,10 @@ void PscScanner::receive(Instant now) {
     return;
   }
   // The bytes of the last frame lie where the next message would go.
-  if (!unpack(settings_.points_a_tick)) return;
+  if (packed_ && !arriving_) {
+    unpack(settings_.points_a_tick);
+    if (packed_) return;
+  }
   for (std::size_t budget = settings_.bytes_a_tick; budget > 0;) {
     const std::size_t count = read_some(budget);
     if (count == 0) break;
@@ -240,16 +248,52 @@ void PscScanner::receive(Instant now) {
     incoming_ = {};
     if (packed_) return;
   }
+  look_at_arriving();
 }
 
-bool PscScanner::unpack(std::size_t at_most_points) {
-  if (!packed_) return true;
-  const std::size_t end = unpacked_ + std::min<std::size_t>(at_most_points, packed_->point_count - unpacked_);
-  // The message's bytes are still where they were received.
-  decode_points(std::span<const std::byte>{body_}.first(frame_bytes_), *packed_, unpacked_, end, frame_);
-  unpacked_ = end;
-  if (end == packed_->point_count) packed_.reset();
-  return !packed_;
+std::size_t PscScanner::packed() const {
+  if (!packed_) return 0;
+  const std::size_t here =
+      arriving_ ? points_within(incoming_.body_have, *packed_) : std::size_t{packed_->point_count};
+  return here - unpacked_;
+}
+
+void PscScanner::unpack(std::size_t at_most_points) {
+  if (const std::size_t count = std::min(at_most_points, packed()); count > 0) {
+    // The message's bytes are still where they were received.
+    decode_points(std::span<const std::byte>{body_}.first(frame_bytes_), *packed_, unpacked_,
+                  unpacked_ + count, frame_);
+    unpacked_ += count;
+  }
+  if (packed_ && !arriving_ && unpacked_ == packed_->point_count) packed_.reset();
+}
+
+// A frame that the cell waits for may be looked at as soon as its heights begin to come, the last but one of its
+// columns. Its head decides nothing before the CRC has been right: bytes that are wrong cost a look in vain.
+void PscScanner::look_at_arriving() {
+  if (arriving_ || phase_ != Phase::computing || incoming_.payload_offset == 0 ||
+      incoming_.head.type != Type::frame)
+    return;
+  const auto payload = std::span<const std::byte>{body_}.first(incoming_.head.payload_length);
+  const auto head = decode_frame_head(payload.first(std::min(payload.size(), incoming_.body_have)));
+  if (!head || !is_of_our_shot(*head) || points_within(incoming_.body_have, *head) == 0) return;
+  const auto begun = begin_frame(payload, frame_);
+  if (!begun) return;
+  packed_ = *begun, unpacked_ = 0;
+  arriving_ = true;
+  frame_offset_ = incoming_.payload_offset;
+  frame_bytes_ = incoming_.head.payload_length;
+  events_.push({ScannerEvent::Kind::arriving, shot_.id, {}});
+}
+
+void PscScanner::drop_arriving() {
+  if (!std::exchange(arriving_, false)) return;
+  packed_.reset();
+  unpacked_ = 0;
+}
+
+bool PscScanner::is_of_our_shot(const FrameHead& head) const {
+  return shot_.outstanding && head.shot_id == shot_.id && head.session_id == info_.session_id;
 }
 
 // Reads what is missing of the header, or of the body, and never beyond: nothing is copied twice.
@@ -374,13 +418,17 @@ void PscScanner::on_exposed(std::span<const std::byte> payload, Instant now) {
 void PscScanner::on_frame(std::span<const std::byte> payload, Instant now) {
   const auto head = decode_frame_head(payload);
   if (!head) return broken(now, "FRAME", head.error());
-  if (!shot_.outstanding || head->shot_id != shot_.id || head->session_id != info_.session_id) {
+  if (!is_of_our_shot(*head)) {
     ++stale_frames_;
     return;
   }
-  const auto begun = begin_frame(payload, frame_);
-  if (!begun) return broken(now, "FRAME", begun.error());
-  packed_ = *begun, unpacked_ = 0;
+  if (!std::exchange(arriving_, false)) {
+    const auto begun = begin_frame(payload, frame_);
+    if (!begun) return broken(now, "FRAME", begun.error());
+    packed_ = *begun, unpacked_ = 0;
+  }
+  if (unpacked_ == packed_->point_count) packed_.reset();
+  decode_intensities(payload, *head, frame_);
   frame_.exposed_sensor_ns = incoming_.head.acquired_ns;
   frame_.arrived = now;
   frame_offset_ = incoming_.payload_offset;

@@ -58,7 +58,9 @@ class PscScanner final : public Scanner {
   ScannerState state() const override;
   const ScannerInfo& info() const override { return info_; }
   const Frame& frame() const override { return frame_; }
-  bool unpack(std::size_t at_most_points) override;
+  void unpack(std::size_t at_most_points) override;
+  std::size_t unpacked() const override { return unpacked_; }
+  std::size_t packed() const override;
   std::uint64_t frame_offset() const override { return frame_offset_; }
   std::uint32_t frame_bytes() const override { return frame_bytes_; }
   std::string_view why() const override { return why_; }
@@ -150,6 +152,9 @@ class PscScanner final : public Scanner {
   void on_exposed(std::span<const std::byte> payload, Instant now);
   void on_frame(std::span<const std::byte> payload, Instant now);
   void on_error(std::span<const std::byte> payload, Instant now);
+  void look_at_arriving();
+  void drop_arriving();
+  bool is_of_our_shot(const psc1::FrameHead&) const;
 
   void watch(Instant now);
   void flush();
@@ -179,7 +184,8 @@ class PscScanner final : public Scanner {
   std::uint32_t request_id_ = 0;
   std::uint64_t received_ = 0;             // all bytes ever read from the link
   std::optional<psc1::FrameHead> packed_;  // of the frame in body_ whose points are not all in frame_
-  std::size_t unpacked_ = 0;               // points that are
+  bool arriving_ = false;                  // it is the message on its way
+  std::size_t unpacked_ = 0;               // points that are in frame_
   std::uint64_t frame_offset_ = 0;
   std::uint32_t frame_bytes_ = 0;
   std::uint64_t stale_frames_ = 0, broken_streams_ = 0;

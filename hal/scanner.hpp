@@ -27,7 +27,14 @@ enum class ScannerState {
 };
 
 struct ScannerEvent {
-  enum class Kind { ready, exposed, frame, shot_failed, lost };
+  enum class Kind {
+    ready,
+    exposed,
+    arriving,  // the shot's frame has begun to come; nothing of it is vouched for before `frame`
+    frame,
+    shot_failed,
+    lost,
+  };
   Kind kind;
   std::uint32_t shot_id = 0;
   Message text{};  // for shot_failed and lost: what happened
@@ -58,11 +65,15 @@ class Scanner {
   virtual std::optional<ScannerEvent> next_event() MOLDLOFT_NONBLOCKING = 0;
   virtual ScannerState state() const MOLDLOFT_NONBLOCKING = 0;
   virtual const ScannerInfo& info() const MOLDLOFT_NONBLOCKING = 0;
-  // The last accepted one, valid until the next trigger(). Its points come unpacked in pieces, so that a large frame
-  // does not take a tick of its own: they are there when unpack() has said true. A driver unpacks by itself, slowly,
+  // The last accepted one, valid until the next trigger(); after `arriving` the one that is on its way, which `frame`
+  // makes good and shot_failed or lost take back. A frame's lines are there from the first; its points come unpacked in
+  // pieces, so that a large frame does not take a tick of its own. A driver unpacks a whole frame by itself, slowly,
   // where nobody asks.
   virtual const Frame& frame() const MOLDLOFT_NONBLOCKING = 0;
-  virtual bool unpack(std::size_t at_most_points) MOLDLOFT_NONBLOCKING = 0;
+  virtual void unpack(std::size_t at_most_points) MOLDLOFT_NONBLOCKING = 0;
+  virtual std::size_t unpacked() const
+      MOLDLOFT_NONBLOCKING = 0;  // points of frame(), from its first, that are there
+  virtual std::size_t packed() const MOLDLOFT_NONBLOCKING = 0;  // points after them that unpack() could take
   virtual std::uint64_t frame_offset() const
       MOLDLOFT_NONBLOCKING = 0;  // where its payload began in all bytes ever received on this link
   virtual std::uint32_t frame_bytes() const MOLDLOFT_NONBLOCKING = 0;  // the payload's size

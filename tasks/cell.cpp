@@ -69,7 +69,7 @@ void Cell::run(Instant now) {
   }
   if (const auto event = robot_.next_event()) on_robot(*event);
   if (const auto event = scanner_.next_event()) on_scanner(*event);
-  if (looking_ && !surface_.looking()) use_shot();
+  if (looking_ && accepted_ && !surface_.looking()) use_shot();
   advance_state();
   publish();
 }
@@ -117,7 +117,8 @@ void Cell::enter(CellAction action) {
       break;
     case CellAction::forget_run:
       wanted_.reset();
-      looking_ = false;
+      accepted_ = false;
+      drop_look();
       shot_state_ = ShotState::parked;
       set_phase(Phase::none);
       break;
@@ -207,15 +208,20 @@ void Cell::on_scanner(const hal::ScannerEvent& event) {
     case Kind::exposed:
       if (shot_state_ == ShotState::exposing && event.shot_id == arm_.shot_id) apply(ShotEvent::exposed);
       break;
+    case Kind::arriving:
+      if (awaits_frame() && event.shot_id == exposed_.shot_id) look_at(exposed_, scanner_.frame(), &scanner_);
+      break;
     case Kind::frame:
       apply(ShotEvent::frame);
       break;
     case Kind::shot_failed:
       record("scanner", "shot failed", "", "", event.text);
+      drop_look();
       give_up(event.text);
       break;
     case Kind::lost:
       record("scanner", "lost", "", "", event.text);
+      drop_look();
       hold(HoldCause::scanner, event.text);
       break;
   }

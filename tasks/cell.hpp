@@ -151,6 +151,7 @@ class Cell final : public Task {
   void give_up(const hal::Message&) MOLDLOFT_NONBLOCKING;
   bool deliver_archived() MOLDLOFT_NONBLOCKING;
   void skip_given_up() MOLDLOFT_NONBLOCKING;
+  bool awaits_frame() const MOLDLOFT_NONBLOCKING;
   bool frame_is_done() const MOLDLOFT_NONBLOCKING;
   bool may_expose() const MOLDLOFT_NONBLOCKING;
   Eigen::Vector3d hint_in_world(const Order&) const MOLDLOFT_NONBLOCKING;
@@ -160,6 +161,8 @@ class Cell final : public Task {
   void measure() MOLDLOFT_NONBLOCKING;
   void advance_phase() MOLDLOFT_NONBLOCKING;
   void look_at(const Order&, const hal::Frame&, hal::Scanner* unpacks) MOLDLOFT_NONBLOCKING;
+  void drop_look() MOLDLOFT_NONBLOCKING;
+  void accept(const hal::Frame&) MOLDLOFT_NONBLOCKING;
   void use_shot() MOLDLOFT_NONBLOCKING;
   std::optional<double> learn_heights(const geometry::RigidMotion& world_from_scanner) MOLDLOFT_NONBLOCKING;
   void use_boundary_shot(const Order&, const geometry::RigidMotion& world_from_scanner,
@@ -189,7 +192,8 @@ class Cell final : public Task {
   ShotState shot_state_ = ShotState::parked;
   std::optional<Order> wanted_;
   Order arm_, exposed_, looked_at_;
-  bool looking_ = false;  // the background work has the last frame
+  bool looking_ = false;   // the background work has a frame, the last or the one that arrives
+  bool accepted_ = false;  // it is whole
   hal::Pose standing_;
   std::uint32_t last_number_ = 0, epoch_ = 0;
 

@@ -73,10 +73,9 @@ void Cell::advance_phase() {
   }
 }
 
-// Hands a shot's frame to the background work for finding the plate in it; use_shot() follows when that is done.
+// Hands a shot's frame to the background work for finding the plate in it, which may begin before all of it is there;
+// use_shot() follows when that is done and the frame was accepted.
 void Cell::look_at(const Order& order, const hal::Frame& frame, hal::Scanner* unpacks) {
-  ++taken_[static_cast<std::size_t>(order.purpose)];
-  points_seen_ += frame.point_count;
   looked_at_ = order;
   const geometry::RigidMotion world_from_scanner =
       scanner_motion_at(order.reported, settings_.tip_from_scanner);
@@ -89,6 +88,20 @@ void Cell::look_at(const Order& order, const hal::Frame& frame, hal::Scanner* un
               unpacks);
   surface_.look(view_);
   looking_ = true;
+  accepted_ = false;
+}
+
+// What has been looked at so far was no frame: it will not become whole.
+void Cell::drop_look() {
+  if (!looking_ || accepted_) return;
+  surface_.stop_looking();
+  looking_ = false;
+}
+
+void Cell::accept(const hal::Frame& frame) {
+  accepted_ = true;
+  ++taken_[static_cast<std::size_t>(looked_at_.purpose)];
+  points_seen_ += frame.point_count;
 }
 
 void Cell::use_shot() {

@@ -36,6 +36,11 @@ void Cell::sequence() {
     hold(HoldCause::recorder, recorder_.store_error());
 }
 
+bool Cell::awaits_frame() const {
+  return shot_state_ == ShotState::computing || shot_state_ == ShotState::driving_computing ||
+         shot_state_ == ShotState::in_place_computing;
+}
+
 // The next frame would overwrite the last one: nobody may need that any more.
 bool Cell::frame_is_done() const {
   const auto stage = surface_.stage();
@@ -173,7 +178,8 @@ void Cell::deliver() {
                   .reported = exposed_.reported,
                   .payload_offset = scanner_.frame_offset(),
                   .payload_bytes = scanner_.frame_bytes()});
-  look_at(exposed_, frame, &scanner_);
+  if (!looking_) look_at(exposed_, frame, &scanner_);
+  accept(frame);
 }
 
 // A surface shot that the archive leaves out before later ones was given up when the run was recorded, and
@@ -204,6 +210,7 @@ bool Cell::deliver_archived() {
   if (phase_ == Phase::scan_surface) next_surface_shot();
   last_frame_ = now_;
   look_at(exposed_, *shot->frame, nullptr);
+  accept(*shot->frame);
   return true;
 }
 

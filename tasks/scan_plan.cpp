@@ -18,6 +18,17 @@ constexpr int samples_per_side = 64;
 constexpr int sample_count = 4 * samples_per_side;
 using Samples = std::array<Vector2d, sample_count>;
 
+// World turned by a yaw; every sample goes through it, several times.
+class Turned {
+ public:
+  explicit Turned(double yaw) : c_{std::cos(yaw)}, s_{std::sin(yaw)} {}
+  Vector2d into(const Vector2d& p) const { return {c_ * p.x() + s_ * p.y(), -s_ * p.x() + c_ * p.y()}; }
+  Vector2d out_of(const Vector2d& p) const { return {c_ * p.x() - s_ * p.y(), s_ * p.x() + c_ * p.y()}; }
+
+ private:
+  double c_, s_;
+};
+
 struct Box {
   double yaw = 0;     // of its first axis in world
   Vector2d min, max;  // in its own axes
@@ -35,16 +46,11 @@ Samples sample(const geometry::Outline& outline) {
   return points;
 }
 
-Vector2d into(double yaw, const Vector2d& p) {
-  const double c = std::cos(yaw), s = std::sin(yaw);
-  return {c * p.x() + s * p.y(), -s * p.x() + c * p.y()};
-}
-Vector2d out_of(double yaw, const Vector2d& p) { return into(-yaw, p); }
-
 Box box_at(double yaw, const Samples& points) {
   Box box{.yaw = yaw, .min = {INFINITY, INFINITY}, .max = {-INFINITY, -INFINITY}};
+  const Turned axes{yaw};
   for (const auto& p : points) {
-    const Vector2d q = into(yaw, p);
+    const Vector2d q = axes.into(p);
     box.min = box.min.cwiseMin(q);
     box.max = box.max.cwiseMax(q);
   }
@@ -82,11 +88,11 @@ Spread spread(double from, double to, double field, const ScanPlanSettings& sett
 }
 
 // How far the outline reaches along the first axis between two heights of the second.
-std::pair<double, double> extent_in_row(const Box& box, const Samples& points, double low, double high) {
+std::pair<double, double> extent_in_row(const Turned& axes, const Samples& points, double low, double high) {
   double from = INFINITY, to = -INFINITY;
   for (int i = 0; i < sample_count; ++i) {
-    Vector2d a = into(box.yaw, points[static_cast<std::size_t>(i)]);
-    Vector2d b = into(box.yaw, points[static_cast<std::size_t>((i + 1) % sample_count)]);
+    Vector2d a = axes.into(points[static_cast<std::size_t>(i)]);
+    Vector2d b = axes.into(points[static_cast<std::size_t>((i + 1) % sample_count)]);
     if (a.y() > b.y()) std::swap(a, b);
     if (b.y() < low || a.y() > high) continue;
     const double rise = std::max(b.y() - a.y(), 1e-12);
@@ -108,11 +114,12 @@ std::expected<std::size_t, geometry::Error> plan_zigzag(const geometry::Outline&
                                                         std::span<ShotPlace> places) {
   const Samples points = sample(outline);
   const Box box = least_box(outline, points);
+  const Turned axes{box.yaw};
   const double half_turns = std::round((head_yaw_now - box.yaw) / std::numbers::pi);
   const double yaw = box.yaw + half_turns * std::numbers::pi;
 
   const Spread rows = spread(box.min.y(), box.max.y(), settings.field_y_mm, settings);
-  const Vector2d start = into(box.yaw, from);
+  const Vector2d start = axes.into(from);
   const bool from_top = start.y() > (box.min.y() + box.max.y()) / 2;
   bool forwards = start.x() < (box.min.x() + box.max.x()) / 2;
 
@@ -120,13 +127,13 @@ std::expected<std::size_t, geometry::Error> plan_zigzag(const geometry::Outline&
   for (int row = 0; row < rows.count; ++row, forwards = !forwards) {
     const double y = rows.first + (from_top ? rows.count - 1 - row : row) * rows.step;
     const auto [low, high] =
-        extent_in_row(box, points, y - settings.field_y_mm / 2, y + settings.field_y_mm / 2);
+        extent_in_row(axes, points, y - settings.field_y_mm / 2, y + settings.field_y_mm / 2);
     if (low > high) continue;
     const Spread columns = spread(low, high, settings.field_x_mm, settings);
     for (int column = 0; column < columns.count; ++column) {
       if (count == places.size()) return std::unexpected{geometry::Error::capacity};
       const double x = columns.first + (forwards ? column : columns.count - 1 - column) * columns.step;
-      const Vector2d centre = out_of(box.yaw, {x, y});
+      const Vector2d centre = axes.out_of({x, y});
       places[count++] = {.centre = {centre.x(), centre.y(), heights.at(centre.x(), centre.y())},
                          .head_yaw = yaw};
     }

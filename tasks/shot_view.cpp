@@ -27,8 +27,9 @@ std::size_t ShotView::bytes() const {
 void ShotView::begin(const hal::Frame& frame, const Request& request, hal::Scanner* unpacks) {
   settings_.runs.hint_reach_mm = request.reach_mm;
   request_ = request;
+  frame_ = &frame;
   unpacks_ = unpacks;
-  stage_ = Stage::unpack;
+  stage_ = Stage::cut;
   runs_ = {};
   boundary_ = {};
   stripes_.clear();
@@ -45,12 +46,29 @@ void ShotView::begin(const hal::Frame& frame, const Request& request, hal::Scann
   (void)begun;
 }
 
+std::size_t ShotView::points_here() const {
+  return unpacks_ == nullptr ? frame_->point_count : unpacks_->unpacked();
+}
+
+// Stripes are cut as soon as their own points are there.
+std::size_t ShotView::points_wanted() const {
+  const std::size_t stripes = finder_.reads_up_to(stripes_a_step);
+  if (stripes == 0) return 0;
+  const auto& last = frame_->stripes[stripes - 1];
+  return std::size_t{last.first} + last.count;
+}
+
+bool ShotView::waits() const {
+  return stage_ == Stage::cut && points_here() < points_wanted() && unpacks_->packed() == 0;
+}
+
 bool ShotView::step() {
   switch (stage_) {
-    case Stage::unpack:
-      if (unpacks_ == nullptr || unpacks_->unpack(points_a_step)) stage_ = Stage::cut;
-      return false;
     case Stage::cut: {
+      if (points_here() < points_wanted()) {
+        unpacks_->unpack(points_a_step);
+        return false;
+      }
       const auto cut = finder_.cut_stripes(stripes_a_step, settings_.runs);
       if (!cut) return end();
       if (*cut) stage_ = Stage::find;
@@ -78,9 +96,8 @@ bool ShotView::step() {
 
 std::size_t ShotView::next_kind() const {
   switch (stage_) {
-    case Stage::unpack:
-      return 1;
     case Stage::cut:
+      if (points_here() < points_wanted()) return 1;
       return finder_.walks() ? 2 : 3;
     case Stage::find:
       return finder_.describes() ? 5 : 4;

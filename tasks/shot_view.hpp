@@ -34,10 +34,12 @@ class ShotView {
     double reach_mm = 0;            // ... good to this
     bool boundary = true;           // false: only the points on the plate are wanted
   };
-  // Looks at a frame, which must stay as it is. `unpacks`, when given, holds points of it that are still packed.
-  // In bounded pieces: begin(), then step() until it says true, then found() and the rest may be asked.
+  // Looks at a frame, which must stay as it is. `unpacks`, when given, holds points of it that are still packed or have
+  // still to arrive. In bounded pieces: begin(), then step() until it says true, then found() and the rest may be
+  // asked.
   void begin(const hal::Frame& frame, const Request&, hal::Scanner* unpacks = nullptr) MOLDLOFT_NONBLOCKING;
   bool step() MOLDLOFT_NONBLOCKING;
+  bool waits() const MOLDLOFT_NONBLOCKING;  // step() can do nothing before more of the frame has arrived
   // Of the pieces, those that cost alike (BackgroundTask::next_kind()); 0 for the others.
   std::size_t next_kind() const MOLDLOFT_NONBLOCKING;
   bool found() const { return !runs_.empty(); }
@@ -53,8 +55,11 @@ class ShotView {
   std::size_t bytes() const;
 
  private:
-  enum class Stage : std::uint8_t { unpack, cut, find, boundary, done };
+  enum class Stage : std::uint8_t { cut, find, boundary, done };
   static constexpr std::size_t points_a_step = 2048, stripes_a_step = 8, runs_a_step = 16;
+  // Of the frame's points, from the first: those that are unpacked, by whomever, and those that the next cut needs.
+  std::size_t points_here() const MOLDLOFT_NONBLOCKING;
+  std::size_t points_wanted() const MOLDLOFT_NONBLOCKING;
   bool end() MOLDLOFT_NONBLOCKING;
   bool within_margins(const geometry::PlateRun&, std::uint32_t point) const;
   bool is_outlier(const geometry::PlateRun&, std::uint32_t point) const;
@@ -66,6 +71,7 @@ class ShotView {
   std::span<const geometry::PlateRun> runs_;
   geometry::BoundaryViewer::View boundary_;
   Request request_;
+  const hal::Frame* frame_ = nullptr;
   hal::Scanner* unpacks_ = nullptr;
   Stage stage_ = Stage::done;
   std::size_t run_ = 0;  // where the walk stands

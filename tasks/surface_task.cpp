@@ -69,13 +69,13 @@ void SurfaceTask::solve() {
 }
 
 bool SurfaceTask::has_work() const {
-  return looking() || keeping() || stage_ == Stage::choosing_corners || stage_ == Stage::building_outline ||
+  return can_look() || keeping() || stage_ == Stage::choosing_corners || stage_ == Stage::building_outline ||
          stage_ == Stage::clearing || stage_ == Stage::folding_reserve || stage_ == Stage::folding ||
          stage_ == Stage::solving;
 }
 
 void SurfaceTask::step(Instant) {
-  if (looking()) {
+  if (can_look()) {
     if (looking_at_->step()) looking_at_ = nullptr;
     return;
   }

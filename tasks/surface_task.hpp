@@ -56,8 +56,10 @@ class SurfaceTask final : public BackgroundTask {
   explicit SurfaceTask(const SurfaceTaskSettings&);
 
   void begin() MOLDLOFT_NONBLOCKING;
-  // Looks at the frame that `shot` has begun; looking() turns false when its view is there. Goes before all else.
+  // Looks at the frame that `shot` has begun; looking() turns false when its view is there. Goes before all else, but
+  // for the times when more of the frame has to arrive first.
   void look(ShotView& shot) { looking_at_ = &shot; }
+  void stop_looking() { looking_at_ = nullptr; }
   bool looking() const { return looking_at_ != nullptr; }
   // Keeps a thinned copy of the plate's points of a boundary shot; `shot` and its frame stay untouched by others as
   // long as keeping() says true. Goes before the work on the outline.
@@ -72,7 +74,7 @@ class SurfaceTask final : public BackgroundTask {
 
   bool has_work() const override;
   void step(Instant deadline) override;
-  std::size_t next_kind() const override { return looking() ? looking_at_->next_kind() : 0; }
+  std::size_t next_kind() const override { return can_look() ? looking_at_->next_kind() : 0; }
 
   Stage stage() const { return stage_; }
   bool outline_ready() const { return stage_ >= Stage::folding_reserve && stage_ != Stage::failed; }
@@ -92,6 +94,7 @@ class SurfaceTask final : public BackgroundTask {
   // quarter of it.
   static constexpr std::size_t chunk_points = 88, kept_points = 320;
 
+  bool can_look() const MOLDLOFT_NONBLOCKING { return looking() && !looking_at_->waits(); }
   void fail(geometry::Error error);
   void step_keep() MOLDLOFT_NONBLOCKING;
   void step_corners();

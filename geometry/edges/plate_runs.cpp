@@ -319,10 +319,16 @@ std::expected<void, Error> PlateRunFinder::begin(std::span<const StripeView> str
   return {};
 }
 
+std::size_t PlateRunFinder::reads_up_to(std::size_t at_most) const {
+  const std::size_t more =
+      walks_.empty() ? std::min({at_most, stripes_in_turn, stripes_.size() - next_stripe_}) : walks_.size();
+  return next_stripe_ + more;
+}
+
 std::expected<bool, Error> PlateRunFinder::cut_stripes(std::size_t at_most,
                                                        const PlateRunSettings& settings) {
   if (walks_.empty() && next_stripe_ < stripes_.size())
-    begin_walks(std::min({at_most, stripes_in_turn, stripes_.size() - next_stripe_}), settings);
+    begin_walks(reads_up_to(at_most) - next_stripe_, settings);
   if (walking_) {
     walking_ = !StripeWalk::walk_in_turn(walks_, stripe_kernel(simd_), points_in_turn);
     return false;

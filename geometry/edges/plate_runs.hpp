@@ -82,6 +82,8 @@ class PlateRunFinder {
                                          const PlateRunSettings& settings) MOLDLOFT_GEOMETRY_NONBLOCKING;
   std::expected<bool, Error> find_plate(std::size_t at_most_runs, const Eigen::Vector3d& hint,
                                         const PlateRunSettings& settings) MOLDLOFT_GEOMETRY_NONBLOCKING;
+  // How many stripes, from the first, the next cut_stripes() reads: a frame may be cut while it still arrives.
+  std::size_t reads_up_to(std::size_t at_most) const MOLDLOFT_GEOMETRY_NONBLOCKING;
   // cut_stripes() walks next, which is the costlier half.
   bool walks() const MOLDLOFT_GEOMETRY_NONBLOCKING { return walking_ || walks_.empty(); }
   bool describes() const MOLDLOFT_GEOMETRY_NONBLOCKING {  // find_plate() has come to the costlier half

@@ -216,6 +216,38 @@ TEST_CASE(
   }
 }
 
+TEST_CASE("of a payload that is on its way, exactly the points that are whole can be decoded") {
+  for (const Encoding encoding : {Encoding::int16, Encoding::float32}) {
+    for (const bool intensity : {true, false}) {
+      const Frame frame = sample_frame(3, 7);
+      std::vector<std::byte> wire(encoded_frame_size(frame, encoding, intensity));
+      REQUIRE(encode_frame(8, frame, encoding, intensity, {51, 51, 40}, wire) == wire.size());
+      const auto payload = payload_of(wire);
+      Frame whole{3, 21};
+      REQUIRE(decode_frame(payload, whole));
+      const std::size_t size = encoding == Encoding::int16 ? 2 : 4,
+                        before_heights = 48 + 3 * 12 + 2 * 21 * size;
+      for (std::size_t have = 48 + 3 * 12; have <= payload.size(); ++have) {
+        CAPTURE(have);
+        std::vector<std::byte> arrived(payload.begin(), payload.end());
+        std::fill(arrived.begin() + static_cast<std::ptrdiff_t>(have), arrived.end(), std::byte{0x3f});
+        Frame part{3, 21};
+        const auto head = begin_frame(arrived, part);
+        REQUIRE(head);
+        const std::size_t points = points_within(have, *head);
+        CHECK(points ==
+              (have < before_heights ? 0 : std::min<std::size_t>(21, (have - before_heights) / size)));
+        decode_points(arrived, *head, 0, points, part);
+        for (std::size_t i = 0; i < points; ++i) {
+          CHECK(part.x[i] == whole.x[i]);
+          CHECK(part.y[i] == whole.y[i]);
+          CHECK(part.z[i] == whole.z[i]);
+        }
+      }
+    }
+  }
+}
+
 TEST_CASE("a frame in float32 comes back exactly, a point with one coordinate missing is missing") {
   Frame frame = sample_frame(2, 40);
   frame.z[9] = NAN;

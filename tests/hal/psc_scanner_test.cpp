@@ -47,8 +47,7 @@ struct Cell {
     REQUIRE(run_until(Kind::ready));
   }
   const Frame& frame() {
-    while (!scanner.unpack(64)) {
-    }
+    while (scanner.packed() > 0) scanner.unpack(64);
     return scanner.frame();
   }
   std::size_t count(Kind kind) const {
@@ -153,11 +152,11 @@ TEST_CASE("a frame is unpacked in pieces of any size, and its lines are known be
     REQUIRE(cell.run_until(Kind::frame));
     CHECK(cell.scanner.frame().point_count == 500);
     CHECK(cell.scanner.frame().lines().size() == 10);
-    std::size_t calls = 1;
-    while (!cell.scanner.unpack(piece)) ++calls;
+    std::size_t calls = 0;
+    for (; cell.scanner.unpacked() < 500; ++calls) cell.scanner.unpack(piece);
     CHECK(calls == (500 + piece - 1) / piece);
     CHECK(same_points(cell.scanner.frame(), truth));
-    CHECK(cell.scanner.unpack(piece));  // nothing left to do
+    CHECK(cell.scanner.packed() == 0);
   }
 }
 
@@ -180,6 +179,79 @@ TEST_CASE("the driver unpacks by itself where nobody asks, and reads no byte ove
   CHECK(cell.scanner.frame().shot_id == 4);
   CHECK(same_points(cell.frame(), through_the_wire(sample_frame(10, 50, 4, 1000))));
   CHECK(cell.scanner.broken_streams() == 0);
+}
+
+TEST_CASE("a frame can be looked at while it arrives: its points are there before its last byte") {
+  for (const auto encoding : {psc1::Encoding::int16, psc1::Encoding::float32}) {
+    Cell cell{{.encoding = encoding}, 40e3};  // 40 bytes a tick
+    cell.start();
+    REQUIRE(cell.scanner.trigger(3, cell.clock.now()));
+    REQUIRE(cell.run_until(Kind::arriving));
+    CHECK(cell.events.back().shot_id == 3);
+    CHECK(cell.scanner.frame().lines().size() == 10);
+    CHECK(cell.scanner.unpacked() == 0);
+    CHECK(cell.scanner.packed() > 0);
+    CHECK(cell.scanner.packed() <= 20);  // of the first tick of the heights
+    Frame truth = sample_frame(10, 50, 3, 1000);
+    if (encoding == psc1::Encoding::int16) truth = through_the_wire(truth);
+    std::size_t seen = 0;
+    while (seen < 500 && cell.count(Kind::frame) == 0) {
+      while (cell.scanner.packed() > 0) cell.scanner.unpack(7);
+      for (; seen < cell.scanner.unpacked(); ++seen) REQUIRE(cell.scanner.frame().z[seen] == truth.z[seen]);
+      cell.tick();
+    }
+    CHECK(seen == 500);
+    CHECK(cell.count(Kind::frame) == 0);  // the intensities are still on their way
+    REQUIRE(cell.run_until(Kind::frame));
+    CHECK(cell.scanner.packed() == 0);
+    CHECK(same_points(cell.scanner.frame(), truth));
+    CHECK(cell.count(Kind::arriving) == 1);
+  }
+}
+
+TEST_CASE("what arrives is taken back when its CRC turns out wrong, and begins anew with the next attempt") {
+  Cell cell{{}, 40e3};
+  cell.start();
+  cell.peer.on_send = damage_first(1, psc1::Type::frame, 32 + 48 + 120 + 3499);  // in the last intensity
+  REQUIRE(cell.scanner.trigger(5, cell.clock.now()));
+  REQUIRE(cell.run_until(Kind::arriving));
+  while (cell.count(Kind::lost) == 0) {
+    cell.scanner.unpack(500);
+    REQUIRE(cell.count(Kind::frame) == 0);
+    cell.tick();
+  }
+  CHECK(cell.scanner.unpacked() == 0);
+  CHECK(cell.scanner.packed() == 0);
+  REQUIRE(cell.run_until(Kind::arriving));
+  CHECK(cell.scanner.unpacked() == 0);
+  REQUIRE(cell.run_until(Kind::frame));
+  CHECK(same_points(cell.frame(), through_the_wire(sample_frame(10, 50, 5, 1000))));
+  CHECK(cell.peer.exposures == 1);
+}
+
+TEST_CASE("a frame that comes in one piece is not announced first, one that nobody waits for not at all") {
+  Cell fast;
+  fast.start();
+  REQUIRE(fast.scanner.trigger(5, fast.clock.now()));
+  REQUIRE(fast.run_until(Kind::frame));
+  CHECK(fast.count(Kind::arriving) == 0);
+
+  Cell slow{{}, 40e3};
+  slow.start();
+  REQUIRE(slow.scanner.trigger(5, slow.clock.now()));
+  REQUIRE(slow.run_until(Kind::exposed));
+  slow.peer.send_frame(4, 1000);  // another shot's
+  slow.peer.send_frame(5, 999);   // another session's
+  REQUIRE(slow.run_until(Kind::arriving));
+  CHECK(slow.scanner.stale_frames() == 2);
+  slow.scanner.forget_shot();
+  CHECK(slow.scanner.packed() == 0);
+  REQUIRE(slow.scanner.trigger(6, slow.clock.now()));
+  REQUIRE(slow.run_until(Kind::frame));
+  CHECK(slow.scanner.stale_frames() == 3);
+  CHECK(slow.count(Kind::arriving) == 2);
+  CHECK(slow.scanner.frame().shot_id == 6);
+  CHECK(same_points(slow.frame(), through_the_wire(sample_frame(10, 50, 6, 1000))));
 }
 
 TEST_CASE("a stream in pieces of any size gives the same frame") {

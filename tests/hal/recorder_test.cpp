@@ -207,7 +207,8 @@ TEST_CASE(
     const auto frame = store.frame(store.shots()->back());
     REQUIRE(frame);
     CHECK(frame->shot_id == id);
-    REQUIRE(driver.unpack(frame->point_count));
+    driver.unpack(frame->point_count);
+    REQUIRE(driver.unpacked() == frame->point_count);
     CHECK(frame->exposed_sensor_ns == driver.frame().exposed_sensor_ns);
     CHECK(std::ranges::equal(frame->z, std::span{driver.frame().z}.first(frame->point_count)));
   }

@@ -67,11 +67,13 @@ TEST_CASE("the controller's drivers bring the scanner over the plate and get a f
   REQUIRE(bench.scanner.trigger(1, bench.clock.now()));
   REQUIRE(bench.scanner_says()->kind == hal::ScannerEvent::Kind::exposed);
   const auto from = bench.world.world_from_scanner(bench.clock.now());
+  REQUIRE(bench.scanner_says()->kind == hal::ScannerEvent::Kind::arriving);
   REQUIRE(bench.scanner_says()->kind == hal::ScannerEvent::Kind::frame);
 
   // Every point, carried into the plate's frame by the true pose, lies on its surface but for the noise.
   const auto& frame = bench.scanner.frame();
-  REQUIRE(bench.scanner.unpack(frame.point_count));
+  bench.scanner.unpack(frame.point_count);
+  REQUIRE(bench.scanner.unpacked() == frame.point_count);
   const auto plate_from_scanner = bench.world.plate().world_from_plate().inverse() * from;
   int seen = 0, near = 0;
   for (std::uint32_t k = 0; k < frame.point_count; ++k) {
@@ -96,6 +98,7 @@ TEST_CASE("after a cut cable the drivers come back, and no motion and no exposur
   REQUIRE(bench.scanner_says()->kind == hal::ScannerEvent::Kind::lost);
   bench.scanner_cable.mend();
   REQUIRE(bench.scanner_says()->kind == hal::ScannerEvent::Kind::ready);
+  REQUIRE(bench.scanner_says()->kind == hal::ScannerEvent::Kind::arriving);
   REQUIRE(bench.scanner_says()->kind ==
           hal::ScannerEvent::Kind::frame);  // the stored one, asked for by its id
   CHECK(bench.world.scanner().counters().exposures == 1);

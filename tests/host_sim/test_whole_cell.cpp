@@ -34,6 +34,11 @@ TEST_CASE("the default run completes, and its summary says everything that it pr
   const double seconds = s["cycle"]["seconds"].get<double>();
   CHECK(seconds > 5);
   CHECK(seconds < 60);
+  // What a frame decides leaves in the tick that reads its last byte: the frame was looked at while it came.
+  const Json timing = Json::parse(cell.file("timing.json"));
+  CHECK(timing["frame_to_command"]["count"] ==
+        s["shots"]["seek"].get<int>() + s["shots"]["boundary"].get<int>() - 1);
+  CHECK(timing["frame_to_command"]["max_us"] == 0);
   // Of cell time: a step of the fit is charged its whole quantum, whatever the machine.
   CHECK(s["surface"]["ready_after_last_frame_ms"].get<double>() <= 50);
   CHECK(s["cycle"]["idle_fraction"].get<double>() >= 0);

@@ -28,6 +28,11 @@ bool computes(const SimulatedCell& cell, hal::Instant now) {
   auto& scanner = cell.world.scanner();
   return now > scanner.busy_from() + 50ms && now < scanner.busy_until();
 }
+// Past the middle of the heights, the last but one of a frame's columns: 350 kB at 12.5 MB/s take 28 ms.
+bool arrives(const SimulatedCell& cell, hal::Instant now) {
+  const hal::Instant sent = cell.world.scanner().busy_until();
+  return now > sent + 20ms && now < sent + 27ms;
+}
 bool moves(const SimulatedCell& cell, hal::Instant now) {
   return now > cell.world.robot().busy_from() && now < cell.world.robot().stands_at();
 }
@@ -93,6 +98,34 @@ TEST_CASE(
         cell.shots().size());  // the scanner gave the stored frame: nothing was exposed twice
   CHECK(cell.repeats >= 1);
   CHECK(run.summary["shots"]["surface"] == 16);
+}
+
+TEST_CASE(
+    "scanner cable cut while a frame arrives: what was seen of it counts for nothing, and the frame comes "
+    "again") {
+  for (const bool on_surface : {false, true}) {
+    CAPTURE(on_surface);
+    ScriptedRun cell, undisturbed;
+    Once cut;
+    bool looked = false;
+    const auto run = cell.run([&](const SimulatedCell& c, hal::Instant now) {
+      const bool there = on_surface ? surface_shots(c) == 5 : boundary_shots(c) == 5;
+      if (cut.begins(there && arrives(c, now), now)) {
+        looked = c.controller.surface().looking();
+        c.scanner_cable.cut();
+      }
+      if (cut.is_over(2s, now)) c.scanner_cable.mend();
+    });
+    CHECK(looked);
+    CHECK(cell.went_through("Held"));
+    CHECK(run.exit_code == firmware_like::exit_done);
+    CHECK(cell.exposures == cell.shots().size());
+    CHECK(cell.repeats >= 1);
+    const auto smooth = undisturbed.run();
+    CHECK(run.summary["shots"] == smooth.summary["shots"]);
+    CHECK(run.summary["points"] == smooth.summary["points"]);
+    CHECK(cell.file("surface.json") == undisturbed.file("surface.json"));
+  }
 }
 
 TEST_CASE(
