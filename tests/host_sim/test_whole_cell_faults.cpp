@@ -164,13 +164,16 @@ TEST_CASE(
 }
 
 TEST_CASE("scanner power cycle in mid-frame: the shot is taken again and the run completes") {
-  for (const bool on_surface : {false, true}) {
+  for (const int variant : {0, 1, 2, 3}) {
+    const bool on_surface = variant % 2 == 1, in_its_frame = variant >= 2;
     CAPTURE(on_surface);
+    CAPTURE(in_its_frame);
     ScriptedRun cell;
     Once cycle;
     const auto run = cell.run([&](const SimulatedCell& c, hal::Instant now) {
       const bool there = on_surface ? surface_shots(c) == 3 : boundary_shots(c) == 3;
-      if (cycle.begins(there && computes(c, now), now)) c.world.scanner().power_cycle();
+      const bool then = in_its_frame ? arrives(c, now) : computes(c, now);
+      if (cycle.begins(there && then, now)) c.world.scanner().power_cycle();
     });
     CHECK(cycle.happened());
     CHECK(run.exit_code == firmware_like::exit_done);
