@@ -3,25 +3,32 @@
 # (-Wfunction-effects), and a complete run of that program on real links (TCP, pseudo-terminal) must pass without a
 # word of RealtimeSanitizer. Then the rule is broken on purpose in six ways, and each must stop the program.
 #
-#     ./toolchain/rtsan.sh [options of moldloft-sim devices, such as --plate dome --seed 7]
+# With --build the simulated devices come from that build; without it everything is set up and built.
+#
+#     ./toolchain/rtsan.sh [--build DIR] [options of moldloft-sim devices, such as --plate dome --seed 7]
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-toolchain/setup.sh --tests
-cmake --preset release >/dev/null
-cmake --build --preset release --target moldloft-sim pty_modem
+built=$PWD/build/release
+if [ "${1:-}" = --build ]; then
+  built=$2
+  shift 2
+else
+  toolchain/setup.sh --tests
+  cmake --preset release >/dev/null
+  cmake --build --preset release --target moldloft-sim pty_modem
+fi
 cmake --preset rtsan >/dev/null
 cmake --build --preset rtsan --target moldloft realtime_probe
 
-sim=$PWD/build/release/bin/moldloft-sim
 bin=$PWD/build/rtsan/bin
 . toolchain/devices.sh
-start_devices "$sim" "$@"
+start_devices "$built/bin/moldloft-sim" "$@"
 
 # A sanitizer that stops at the first violation leaves no doubt: the exit code is that of a completed run, or it is not.
 # Assertions are compiled in, and the program is several times slower than what is deployed: ticks may be missed.
 run=0
-LD_PRELOAD=$PWD/build/release/lib/libpty_modem.so timeout 300 \
+LD_PRELOAD=$built/lib/libpty_modem.so timeout 300 \
   "$bin/moldloft" run "$scratch/cell.toml" --out "$scratch/run" >"$scratch/run.log" 2>&1 || run=$?
 if [ "$run" -ne 0 ] || grep -q RealtimeSanitizer "$scratch/run.log"; then
   cat "$scratch/run.log" >&2
