@@ -193,9 +193,9 @@ std::string first_difference(const std::string& text, const std::string& other) 
   flatten(toml::parse(text), "", a);
   flatten(toml::parse(other), "", b);
   for (auto* keys : {&a, &b}) {
-    for (const char* addressed : {"cell.name", "cell.device_timeout_s", "scanner.host", "scanner.port",
-                                  "robot.device", "robot.baud"}) {
-      keys->erase(addressed);
+    for (const char* no_matter : {"cell.name", "cell.device_timeout_s", "scanner.host", "scanner.port",
+                                  "robot.device", "robot.baud", "plate.largest_mm"}) {
+      keys->erase(no_matter);
     }
     std::erase_if(*keys, [](const auto& key) { return key.first.starts_with("realtime."); });
   }

@@ -72,7 +72,7 @@ std::expected<CellConfig, ConfigError> parse_config(const std::string& text, con
 
 // The first key whose value differs between two configurations and would make a run measure differently
 // ("start.yaw_deg"); empty when there is none. Where the devices are found, when the program gets its
-// turn, names and comments make no difference.
+// turn, how much memory is planned for, names and comments make no difference.
 std::string first_difference(const std::string& text, const std::string& other);
 
 }  // namespace moldloft::firmware_like

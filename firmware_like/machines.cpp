@@ -41,10 +41,11 @@ template <>
 std::string budget_of(bool (*guard)(const tasks::TrackContext&)) {
   using Context = tasks::TrackContext;
   if (guard(Context{})) return "";
-  const std::pair<int Context::*, const char*> limits[] = {{&Context::max_seek_steps, "steps left"},
-                                                           {&Context::max_turns, "turns left"},
-                                                           {&Context::max_backs, "steps back left"},
-                                                           {&Context::max_shots, "shots left"}};
+  const std::pair<int Context::*, const char*> limits[] = {
+      {&Context::max_seek_steps, "steps left"},
+      {&Context::max_turns, "turns left"},
+      {&Context::max_backs, "steps back left"},
+  };
   std::string text;
   for (const auto& [limit, name] : limits) {
     Context context;

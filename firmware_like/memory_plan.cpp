@@ -105,6 +105,7 @@ tasks::SurfaceTaskSettings surface_settings(const CellConfig& c) {
   const tasks::CellSettings cell = cell_settings(c);
   tasks::SurfaceTaskSettings s;
   s.max_edge_points = cell.tracker.max_edge_points;
+  s.corners.max_candidates = static_cast<std::size_t>(cell.tracker.max_shots);
   s.max_boundary_shots = static_cast<std::size_t>(cell.tracker.max_shots) + 1;
   s.reserve_points_per_shot =
       (cell.max_points + s.reserve_stride * s.reserve_stride - 1) / (s.reserve_stride * s.reserve_stride) +

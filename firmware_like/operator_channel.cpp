@@ -77,7 +77,8 @@ std::string without_line_end(std::string_view text) {
 }  // namespace
 
 std::string status_json(const tasks::CellProgress& p) {
-  constexpr std::array<const char*, 5> causes = {"none", "scanner", "recorder", "person", "measurement"};
+  constexpr std::array<const char*, 6> causes = {"none",   "scanner", "recorder",
+                                                 "person", "plan",    "measurement"};
   return Json{{"state", std::string{tasks::to_string(p.state)}},
               {"phase", std::string{tasks::to_string(p.phase)}},
               {"hold_cause", causes[static_cast<std::size_t>(p.cause)]},

@@ -94,8 +94,9 @@ std::string how_it_ended(const Controller& controller, const RunOptions& options
     return fmt::format("{}. What was measured is saved in {} (overview.svg shows it); then begin a new run",
                        what, folder);
   }
-  return fmt::format("{}. Everything so far is saved; to go on: moldloft run {} --out {} --resume", what,
-                     options.config_path, folder);
+  const bool too_small = cell.cause() == tasks::HoldCause::plan && cell.state() == tasks::CellState::held;
+  return fmt::format("{}. Everything so far is saved; to go on{}: moldloft run {} --out {} --resume", what,
+                     too_small ? " after that" : "", options.config_path, folder);
 }
 
 // The same for a run that ended before the arm was sent anywhere: nothing was measured, nothing is kept.

@@ -92,6 +92,8 @@ std::expected<RunFolder, RunError> resume_run(const fs::path& path, const std::s
   }
   auto store = hal::RunStore::open(store_path(path), hal::RunStore::Mode::append);
   if (!store) return error(store.error().what);
+  // What is fitted from this run later has to have room for all of it.
+  if (auto written = store->set_meta("config", config_text); !written) return error(written.error().what);
   opened->store = std::make_unique<hal::RunStore>(std::move(*store));
   return opened;
 }

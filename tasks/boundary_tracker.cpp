@@ -40,7 +40,7 @@ constexpr double hint_inside_mm = 10;
 
 BoundaryTracker::BoundaryTracker(const TrackerSettings& settings) : settings_{settings} {
   edges_.reserve(settings.max_edge_points);
-  corners_.reserve(settings.max_corners);
+  corners_.reserve(static_cast<std::size_t>(settings.max_shots));  // each shot shows one of them at most
 }
 
 std::size_t BoundaryTracker::bytes() const {
@@ -51,8 +51,8 @@ void BoundaryTracker::begin(const ShotPlace& start) {
   state_ = TrackState::seek_edge;
   counts_ = TrackContext{.max_seek_steps = settings_.max_seek_steps,
                          .max_turns = settings_.max_turns,
-                         .max_backs = settings_.max_backs,
-                         .max_shots = settings_.max_shots};
+                         .max_backs = settings_.max_backs};
+  shots_ = 0;
   place_ = start;
   hint_ = front_ = start.centre;
   heading_ = {0, 1};
@@ -62,7 +62,7 @@ void BoundaryTracker::begin(const ShotPlace& start) {
 }
 
 BoundaryTracker::Step BoundaryTracker::take(const Seen& seen) {
-  ++counts_.shots;
+  ++shots_;
   if (seen.plate_found) plate_z_mm_ = seen.plate_z_mm;
   Piece piece;
   Step step;
@@ -85,7 +85,15 @@ BoundaryTracker::Step BoundaryTracker::take(const Seen& seen) {
   return step;
 }
 
+// Half an outline would still close, and be believed: what the plan has no room for is never left out.
 TrackEvent BoundaryTracker::observe(const Seen& seen, Piece& piece) {
+  if (state_ == TrackState::seek_edge) return observe_plate(seen, piece);
+  if (seen.view.points.size() > edges_.capacity() - edges_.size()) return TrackEvent::beyond_plan;
+  const TrackEvent event = observe_plate(seen, piece);
+  return event != TrackEvent::loop_closed && shots_ >= settings_.max_shots ? TrackEvent::beyond_plan : event;
+}
+
+TrackEvent BoundaryTracker::observe_plate(const Seen& seen, Piece& piece) {
   if (!seen.plate_found) return TrackEvent::no_plate;
   if (seen.view.plate_fills_field) return TrackEvent::plate_fills_field;
   if (seen.view.pieces.empty()) return TrackEvent::hidden;  // the plate ends, but between two stripes
@@ -134,11 +142,8 @@ bool BoundaryTracker::passes_anchor(const Seen& seen, const Piece& piece) const 
 }
 
 void BoundaryTracker::remember_edges(const Seen& seen) {
-  for (const auto& point : seen.view.points) {
-    if (edges_.size() == edges_.capacity())
-      return;  // sized for max_shots: only a plate beyond the plan gets here
+  for (const auto& point : seen.view.points)
     hal::add_within_reserve(edges_, (seen.world_from_scanner * point.position).head<2>());
-  }
 }
 
 void BoundaryTracker::remember_corner(const Vector2d& corner) {
@@ -147,7 +152,7 @@ void BoundaryTracker::remember_corner(const Vector2d& corner) {
     known = corner;  // the later look has the corner nearer to the middle of the field
     return;
   }
-  if (corners_.size() < corners_.capacity()) hal::add_within_reserve(corners_, corner);
+  hal::add_within_reserve(corners_, corner);
 }
 
 void BoundaryTracker::move_front(const Piece& piece) {
@@ -265,8 +270,9 @@ hal::Message BoundaryTracker::explain(TrackAction action) const {
           "boundary hidden between stripes at x {:.0f} y {:.0f} mm in {} directions: look at the edge there",
           x, y, counts_.turns + 1);
     case TrackAction::report_too_large:
-      return hal::Message::format("outline not closed after {} shots: raise [plate] largest_mm",
-                                  counts_.shots);
+      return hal::Message::format(
+          "outline not closed after {} shots, {} edge points of it stored: raise [plate] largest_mm", shots_,
+          edges_.size());
     default:
       return hal::Message::format(
           "boundary lost at x {:.0f} y {:.0f} mm: clear that edge of the plate and run again", front_.x(),

@@ -44,8 +44,9 @@ enum class TrackEvent : std::uint8_t {
   corner,       // the piece that is being followed, and how it ends: at the field's limit
   hidden,       // ... or hidden between stripes
   loop_closed,  // the piece passes where the outline began
+  beyond_plan,  // no room is left for the edge points that it shows, or for another shot
 };
-constexpr int track_event_count = 6;
+constexpr int track_event_count = 7;
 
 enum class TrackAction : std::uint8_t {
   none,
@@ -64,8 +65,8 @@ enum class TrackAction : std::uint8_t {
 };
 
 struct TrackContext {
-  int seek_steps = 0, turns = 0, backs = 0, shots = 0;
-  int max_seek_steps = 0, max_turns = 0, max_backs = 0, max_shots = 0;
+  int seek_steps = 0, turns = 0, backs = 0;
+  int max_seek_steps = 0, max_turns = 0, max_backs = 0;
 };
 
 using TrackTransition = Transition<TrackState, TrackEvent, TrackAction, TrackContext>;
@@ -86,7 +87,6 @@ struct TrackerSettings {
   double corner_merge_mm = 20;  // corners nearer than this are one, seen twice
   int max_seek_steps = 60, max_turns = 3, max_backs = 2, max_shots = 96;
   std::size_t max_edge_points = 24000;
-  std::size_t max_corners = 64;  // false ones included, which geometry/corner_choice.hpp sorts out
 };
 
 class BoundaryTracker {
@@ -127,6 +127,7 @@ class BoundaryTracker {
     double anchor_distance = 0;
   };
   TrackEvent observe(const Seen&, Piece&);
+  TrackEvent observe_plate(const Seen&, Piece&);
   Piece follow(const Seen&, const Eigen::Vector2d& from) const;
   bool passes_anchor(const Seen&, const Piece&) const;
   void remember_edges(const Seen&);
@@ -141,6 +142,7 @@ class BoundaryTracker {
   TrackerSettings settings_;
   TrackState state_ = TrackState::seek_edge;
   TrackContext counts_;
+  int shots_ = 0;
   ShotPlace place_;  // of the shot that take() is about to look at
   Eigen::Vector3d front_{0, 0, 0}, hint_{0, 0, 0};
   Eigen::Vector2d heading_{1, 0}, anchor_{0, 0};

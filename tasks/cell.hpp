@@ -56,6 +56,7 @@ enum class HoldCause : std::uint8_t {
   scanner,      // ends by itself when the scanner is back
   recorder,     // ends by itself when the disk takes records again
   person,       // something must be seen to; the run can be resumed then
+  plan,         // the plate outgrows the memory plan: the run can be resumed with a larger one
   measurement,  // what was measured, planned or configured leads here each time: resuming would only repeat it
 };
 

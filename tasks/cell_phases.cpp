@@ -50,7 +50,9 @@ void Cell::measure() {
 void Cell::advance_phase() {
   if (surface_.stage() == Stage::failed && phase_ != Phase::none) {
     const auto reason = geometry::to_string(surface_.error());
-    return hold(HoldCause::measurement, hal::Message::format("{}: {}", to_string(phase_), reason));
+    const bool too_small = surface_.error() == geometry::Error::capacity;
+    return hold(too_small ? HoldCause::plan : HoldCause::measurement,
+                hal::Message::format("{}: {}", to_string(phase_), reason));
   }
   switch (phase_) {
     case Phase::plan_scan:
@@ -162,7 +164,8 @@ void Cell::use_boundary_shot(const Order& order, const geometry::RigidMotion& wo
          hal::Message::format("shot {}: {}", order.number, to_string(step.action)));
   switch (step.to) {
     case TrackState::failed:
-      return hold(HoldCause::measurement, step.text);
+      return hold(step.action == TrackAction::report_too_large ? HoldCause::plan : HoldCause::measurement,
+                  step.text);
     case TrackState::closed:
       set_phase(Phase::plan_scan);
       heights_.solve();
@@ -182,8 +185,7 @@ void Cell::plan_surface() {
   const auto planned = plan_zigzag(surface_.outline(), heights_, settings_.scan, last.centre.head<2>(),
                                    last.head_yaw, surface_places_);
   if (!planned) {
-    return hold(HoldCause::measurement,
-                "the plate needs more shots than [plate] largest_mm plans for: raise it and run again");
+    return hold(HoldCause::plan, "the plate needs more shots than are planned for: raise [plate] largest_mm");
   }
   surface_planned_ = *planned;
   surface_next_ = 0;

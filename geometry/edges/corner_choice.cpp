@@ -59,13 +59,14 @@ std::size_t CornerChoice::bytes() const {
 
 void CornerChoice::begin(std::span<const Vector2d> edges, std::span<const Vector2d> candidates) {
   edges_ = edges;
-  candidates_ = candidates.first(std::min(candidates.size(), settings_.max_candidates));
+  candidates_ = candidates;
   chosen_.clear();
   next_ = 0, round_ = 0, edge_ = 0;
   stage_ = Stage::check;
 }
 
 std::expected<bool, Error> CornerChoice::step() {
+  if (candidates_.size() > settings_.max_candidates) return std::unexpected(Error::capacity);
   if (candidates_.empty() || edges_.size() < 2 * fewest_points) return std::unexpected(Error::too_few_points);
   switch (stage_) {
     case Stage::check: {

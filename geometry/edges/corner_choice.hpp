@@ -11,7 +11,7 @@
 //              points of one ring, at most 2,048; about ten of them a round, three rounds a candidate
 // Allocation   in the constructor only
 // Failure      Error::not_four_sided when other than four are left, too_few_points without candidates or edge
-//              points, not_finite when one of them is no number
+//              points, capacity with more candidates than planned, not_finite when one of them is no number
 #pragma once
 
 #include <Eigen/Core>

@@ -247,7 +247,8 @@ TEST_CASE("a configuration is loaded with its path and its text, which the run k
 }
 
 TEST_CASE(
-    "two configurations differ where a run would measure otherwise, not in addresses, names and comments") {
+    "two configurations differ where a run would measure otherwise, not in addresses, memory, names and "
+    "comments") {
   const std::string text =
       "[scanner]\nport = 4014\nfield_mm = [102, 102]\n[scanner.mount]\nzyz_deg = [0, 180, "
       "180]\n[start]\nyaw_deg = 0\n";
@@ -260,6 +261,8 @@ TEST_CASE(
   CHECK(first_difference(
             text, "# at the window\n[cell]\nname = \"b\"\n[robot]\ndevice = \"/dev/ttyS1\"\n" + text) == "");
   CHECK(first_difference(text, "[realtime]\npriority = 20\ncpu = 1\n" + text) == "");
+  CHECK(first_difference(text, "[plate]\nlargest_mm = [900, 900]\n" + text) == "");
+  CHECK(first_difference(text, "[plate]\nthickness_mm = 9\n" + text) == "plate.thickness_mm");
   CHECK(first_difference(text, replaced("yaw_deg = 0", "yaw_deg = 1")) == "start.yaw_deg");
   CHECK(first_difference(text, replaced("[0, 180, 180]", "[0, 180, 181]")) == "scanner.mount.zyz_deg");
   CHECK(first_difference(text, text + "centre_mm = [1, 2, 3]\n") == "start.centre_mm");

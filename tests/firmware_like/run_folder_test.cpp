@@ -90,6 +90,14 @@ TEST_CASE(
             "begin a new run with another --out");
 }
 
+TEST_CASE("a run is resumed with a larger memory plan, and fitted with it from then on") {
+  const hal::TemporaryFolder folder;
+  const std::string path = folder.file("run"), larger = config + "[plate]\nlargest_mm = [900, 900]\n";
+  REQUIRE(create_run(path, config, RunKind::measured).has_value());
+  REQUIRE(resume_run(path, larger).has_value());
+  CHECK(*open_run(path)->store->meta("config") == larger);
+}
+
 TEST_CASE("what is resumed is appended to, what is opened to be read is not") {
   const hal::TemporaryFolder folder;
   const std::string path = folder.file("run");

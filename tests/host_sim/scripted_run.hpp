@@ -27,18 +27,21 @@ class ScriptedRun {
 
   SimulatedRunOptions options;
 
-  // The configuration that fits the cell, with one line replaced; the line is told by its beginning.
-  void set(const std::string& begins, const std::string& line) {
+  // The configuration that fits the cell, with one line replaced; the line is told by its beginning. Returns what stood
+  // there.
+  std::string set(const std::string& begins, const std::string& line) {
     std::istringstream lines{config()};
-    std::string text;
+    std::string text, before;
     bool found = false;
     for (std::string old; std::getline(lines, old);) {
       const bool is_it = old.starts_with(begins);
       found = found || is_it;
+      if (is_it) before = old;
       text += (is_it ? line : old) + "\n";
     }
     REQUIRE(found);
     options.config = text;
+    return before;
   }
 
   SimulatedRun run(const Script& script = {}) {

@@ -144,7 +144,7 @@ TEST_CASE("a folder that holds a run is never overwritten, and resumed only with
   check_refused(
       run_program({MOLDLOFT, "run", config, "--out", run, "--resume"}),
       "moldloft: " + run +
-          ": was begun with another configuration ('plate.largest_mm' differs); resume it with the same, or "
+          ": was begun with another configuration ('robot.workspace.max_step_mm' differs); resume it with the same, or "
           "begin a new run with another --out");
   check_refused(run_program({MOLDLOFT, "fit", run, "--out", run}),
                 "moldloft: " + run + ": is the run itself; give another folder with --out");

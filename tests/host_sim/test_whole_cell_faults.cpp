@@ -278,17 +278,47 @@ TEST_CASE("a plate that leaves the workspace aborts before the arm does, and the
 }
 
 TEST_CASE(
-    "a plate larger than the memory plan is held, everything saved, and the message says what to raise") {
-  for (const double width : {500.0, 900.0}) {
-    CAPTURE(width);
+    "a memory plan that is too small holds the cell with everything saved, and a larger one goes on from "
+    "there") {
+  struct TooSmall {
+    std::string of;  // what the plan has too little of
+    double width_mm;
+    const char *seek, *stripes, *says;
+  };
+  const TooSmall plans[] = {
+      {"shots of the boundary", 900, "seek_limit_mm = 700", "max_stripes = 200", "outline not closed after"},
+      {"edge points", 900, "seek_limit_mm = 9000\noverlap_mm = 70", "max_stripes = 100",
+       "outline not closed after"},
+      {"shots of the surface", 500, "seek_limit_mm = 9000", "max_stripes = 200",
+       "more shots than are planned for"},
+  };
+  for (const TooSmall& plan : plans) {
+    CAPTURE(plan.of);
     ScriptedRun cell;
     cell.options.cell.arm = ArmKind::gantry;
-    cell.options.cell.sizes.width_mm = width;
-    cell.set("largest_mm", "largest_mm = [100, 100]");
+    cell.options.cell.sizes.width_mm = plan.width_mm;
+    const std::string fits = cell.set("largest_mm", "largest_mm = [100, 100]");
+    cell.set("max_stripes", plan.stripes);
+    cell.options.config += std::string{"\n[tracking]\n"} + plan.seek + "\n";
     const auto run = cell.run();
     CHECK(run.exit_code == firmware_like::exit_held);
-    CHECK(says(run, "[plate] largest_mm"));
-    CHECK(cell.shots().size() >= 16);
+    CHECK(says(run, plan.says));
+    CHECK(says(run, "raise [plate] largest_mm"));
+    CHECK(cell.went_through("Held"));
+    const std::size_t saved = cell.shots().size();
+    CHECK(saved >= 10);
+    const std::uint64_t exposed_before = cell.exposures;
+    CHECK(exposed_before == saved);
+
+    cell.set("largest_mm", fits);
+    cell.options.resume = true;
+    const auto resumed = cell.run();
+    CHECK(resumed.exit_code == firmware_like::exit_done);
+    check_truth(resumed.summary);
+    CHECK(cell.exposures == cell.shots().size() - saved);  // nothing that was saved is taken again
+    const hal::TemporaryFolder results;
+    CHECK(firmware_like::fit_run({.run = cell.folder(), .out = results.path()}) == firmware_like::exit_done);
+    CHECK(text_of(results.file("surface.json")) == cell.file("surface.json"));
   }
 }
 

@@ -131,10 +131,61 @@ TEST_CASE("a plate without an end within the seek limit is said so") {
   CHECK(walk.shots == 6);
 }
 
-TEST_CASE("a plate with more boundary than the plan has shots for is said so") {
-  BoundaryTracker tracker{TrackerSettings{.max_shots = 8}};
+TEST_CASE("a plan that is one shot or one edge point too small is said so, one that just holds is enough") {
   const FlatWorld world{.outline = placed(rectangle, 0.3)};
-  const Walk walk = walk_round(tracker, world, start);
-  CHECK(walk.last.to == TrackState::failed);
-  CHECK(walk.last.action == TrackAction::report_too_large);
+  BoundaryTracker roomy{TrackerSettings{}};
+  const int shots = walk_round(roomy, world, start).shots;
+  const std::size_t edges = roomy.edge_points().size();
+  REQUIRE(roomy.state() == TrackState::closed);
+  REQUIRE(shots > 10);
+  REQUIRE(edges > 1000);
+
+  BoundaryTracker exact{TrackerSettings{.max_shots = shots, .max_edge_points = edges}};
+  CHECK(walk_round(exact, world, start).last.to == TrackState::closed);
+  CHECK(std::ranges::equal(exact.edge_points(), roomy.edge_points()));
+
+  BoundaryTracker few_shots{TrackerSettings{.max_shots = shots - 1}};
+  const Walk stopped = walk_round(few_shots, world, start);
+  CHECK(stopped.last.action == TrackAction::report_too_large);
+  CHECK(stopped.shots == shots - 1);
+  CHECK(stopped.last.text.view().starts_with("outline not closed after " + std::to_string(shots - 1) +
+                                             " shots,"));
+
+  BoundaryTracker few_edges{TrackerSettings{.max_edge_points = edges - 1}};
+  const Walk full = walk_round(few_edges, world, start);
+  CHECK(full.last.to == TrackState::failed);
+  CHECK(full.last.action == TrackAction::report_too_large);
+  CHECK(full.last.text.view().ends_with("raise [plate] largest_mm"));
+  // Those before are all there, those of the last shot have not been begun with.
+  const std::size_t kept = few_edges.edge_points().size();
+  CHECK(kept < edges);
+  CHECK(std::ranges::equal(few_edges.edge_points(), roomy.edge_points().first(kept)));
+}
+
+TEST_CASE("heads that turn at every place do not outrun the plan's shots") {
+  // A boundary that hides, then shows, for ever: the table alone would go on as long as it is told so.
+  BoundaryTracker tracker{TrackerSettings{.max_shots = 12}};
+  const FlatWorld world{.outline = placed(rectangle, 0.3)};
+  hal::Frame frame{100, 50000};
+  ShotView view{100, 50000, {}};
+  tracker.begin(start);
+  ShotPlace place = start;
+  int shots = 0;
+  for (; shots < 100; ++shots) {
+    const auto motion = geometry::turned_about_z(place.head_yaw, place.centre);
+    world.expose(motion, frame);
+    view.begin(frame, {.hint = motion.inverse() * tracker.plate_hint(), .reach_mm = 60});
+    while (!view.step()) {
+    }
+    std::vector<geometry::BoundaryPiece> pieces(view.boundary().pieces.begin(), view.boundary().pieces.end());
+    auto seen = view.boundary();
+    for (auto& piece : pieces) piece.hidden_last = tracker.state() == TrackState::track;
+    seen.pieces = pieces;
+    const auto step = tracker.take(
+        {.world_from_scanner = motion, .plate_found = true, .plate_z_mm = world.plate_z, .view = seen});
+    if (!step.next) break;
+    place = *step.next;
+  }
+  CHECK(tracker.state() == TrackState::failed);
+  CHECK(shots + 1 == 12);
 }

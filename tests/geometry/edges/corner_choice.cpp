@@ -92,3 +92,14 @@ TEST_CASE("no candidate at all is an error by name") {
   choice.begin({}, {});
   CHECK(run(choice).error() == Error::too_few_points);
 }
+
+TEST_CASE("more candidates than the plan has room for are an error by name, and none of them is left out") {
+  const auto edges = torn_outline(0, 10);
+  std::vector<Vector2d> candidates(60, Vector2d{200, 12});
+  for (const auto& c : corners) candidates.push_back(c);
+  CornerChoice enough{{.max_candidates = 64}}, too_few{{.max_candidates = 63}};
+  enough.begin(edges, candidates);
+  CHECK(run(enough).value());
+  too_few.begin(edges, candidates);
+  CHECK(run(too_few).error() == Error::capacity);
+}
