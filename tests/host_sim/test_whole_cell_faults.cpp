@@ -287,8 +287,7 @@ TEST_CASE(
   };
   const TooSmall plans[] = {
       {"shots of the boundary", 900, "seek_limit_mm = 700", "max_stripes = 200", "outline not closed after"},
-      {"edge points", 900, "seek_limit_mm = 9000\noverlap_mm = 70", "max_stripes = 100",
-       "outline not closed after"},
+      {"edge points", 1400, "seek_limit_mm = 9000", "max_stripes = 100", "outline not closed after"},
       {"shots of the surface", 500, "seek_limit_mm = 9000", "max_stripes = 200",
        "more shots than are planned for"},
   };
