@@ -53,6 +53,24 @@ std::expected<RobotLine, SimError> robot_line(const DeviceOptions& options) {
   return RobotLine{std::move(port), options.robot_serial, options.controller_serial};
 }
 
+// What the arm and the laser were made to do, as it happens: whoever tests a controller sees what moved, and when.
+class DeviceLog {
+ public:
+  void look(SimulatedWorld& world, hal::Instant since_start) {
+    const auto motions = world.robot().counters().motions;
+    const auto exposures = world.scanner().counters().exposures;
+    if (motions != motions_) line("motion", motions_ = motions, since_start);
+    if (exposures != exposures_) line("exposure", exposures_ = exposures, since_start);
+  }
+
+ private:
+  static void line(const char* what, std::uint64_t number, hal::Instant at) {
+    fmt::print("{} {} at {:.3f} s\n", what, number, std::chrono::duration<double>(at).count());
+    std::fflush(stdout);
+  }
+  std::uint64_t motions_ = 0, exposures_ = 0;
+};
+
 }  // namespace
 
 int run_devices(const DeviceOptions& options) {
@@ -76,10 +94,13 @@ int run_devices(const DeviceOptions& options) {
   std::fflush(stdout);
 
   hal::SteadyClock clock;
-  hal::Instant next = clock.now();
+  const hal::Instant began = clock.now();
+  hal::Instant next = began;
+  DeviceLog log;
   while (asked_to_end == 0) {
     const hal::Instant now = clock.now();
     world.step(now);
+    if (options.log) log.look(world, now - began);
     next = std::max(next + step_time, now);  // casting a frame takes several steps: they are not caught up
     clock.sleep_until(next);
   }

@@ -115,6 +115,7 @@ int main(int argc, char** argv) {
                    "the controller's port at the other end of that cable, for --cell")
       ->needs(serial)
       ->capture_default_str();
+  devices_command->add_flag("--log", devices.log, "a line for each motion that begins and each exposure");
   devices_command->add_option("--cell", devices.cell_toml,
                               "write a configuration that fits these devices to this file");
 

@@ -7,7 +7,7 @@
 #
 # --build   the build tree with moldloft and moldloft-sim; default build/release
 # --out     where the results go; default build/cell-pc/results
-# --jobs    in this order: cyclictest, cell, latency; default all three
+# --jobs    in this order: cyclictest, cell, latency; default all three. Or service, alone: the package's unit under systemd
 # --cpu     QEMU's model of the processor
 # --kernel  linux-image-rt-amd64 (default), or linux-image-amd64: what an ordinary one makes of it
 # --realtime  one line of [realtime] for the cell's configuration, such as 'priority = 0'
@@ -65,18 +65,51 @@ kernel_of_the_distribution() {
   mv "$scratch"/boot/vmlinuz-* "$kernel.$$" && mv "$kernel.$$" "$kernel"
 }
 
+# systemd and udev as they are installed here, with nothing to start but the two daemons and the test itself.
+add_systemd() {
+  local root=$1 unit
+  mkdir -p "$root"/etc/systemd/system "$root"/usr/lib/{systemd/system,sysusers.d,udev/rules.d}
+  cp /usr/bin/{systemctl,journalctl,systemd-sysusers,udevadm,chrt} "$root/usr/bin/"
+  cp -a /usr/lib/systemd/{systemd,systemd-journald,systemd-shutdown,systemd-udevd} "$root/usr/lib/systemd/"
+  cp -a --no-clobber /usr/lib/systemd/system/. "$root/usr/lib/systemd/system/"
+  rm -rf "$root"/usr/lib/systemd/system/*.{wants,requires}
+  for unit in systemd-journald.service systemd-udevd.service systemd-udev-trigger.service; do
+    install -d "$root/etc/systemd/system/sysinit.target.wants"
+    ln -s "/usr/lib/systemd/system/$unit" "$root/etc/systemd/system/sysinit.target.wants/"
+  done
+  for unit in systemd-journald{,-dev-log}.socket systemd-udevd-{control,kernel}.socket; do
+    install -d "$root/etc/systemd/system/sockets.target.wants"
+    ln -s "/usr/lib/systemd/system/$unit" "$root/etc/systemd/system/sockets.target.wants/"
+  done
+  cp /usr/lib/udev/rules.d/{50-udev-default,60-serial}.rules "$root/usr/lib/udev/rules.d/"
+  cp /usr/share/base-passwd/passwd.master "$root/etc/passwd"
+  cp /usr/share/base-passwd/group.master "$root/etc/group"
+  cp /etc/os-release "$root/etc/os-release"
+  echo 0123456789abcdef0123456789abcdef >"$root/etc/machine-id"
+  install -m 644 toolchain/cell-pc/guest/cell-pc.service "$root/etc/systemd/system/"
+  install -m 755 toolchain/cell-pc/guest/service "$root/service"
+}
+
 # The root of the PC: the package as dpkg unpacks it, and beside it what does not ship: the simulated devices.
 make_root() {
-  local root=$scratch/root library
+  local root=$scratch/root library program
   cpack --config "$build/CPackConfig.cmake" -B "$scratch/package" >"$scratch/cpack.log" || { cat "$scratch/cpack.log" >&2; exit 1; }
-  mkdir -p "$root"/{bin,dev,proc,sys,tmp,run}
-  dpkg-deb -x "$scratch"/package/moldloft_*.deb "$root"
+  mkdir -p "$root"/{dev,proc,sys,tmp,run,root,var} "$root"/usr/{bin,sbin,lib,lib64}
+  for program in bin sbin lib lib64; do ln -s usr/$program "$root/$program"; done
+  if [ "$jobs" = service ]; then  # the PC installs it itself, while systemd runs
+    cp "$scratch"/package/moldloft_*.deb "$root/moldloft.deb"
+    dpkg-deb -x "$scratch"/package/moldloft_*.deb "$scratch/unpacked"
+    add_systemd "$root"
+  else
+    dpkg-deb -x "$scratch"/package/moldloft_*.deb "$root"
+  fi
   strip -o "$root/usr/bin/moldloft-sim" "$build/bin/moldloft-sim"
   cp "$(command -v cyclictest)" "$root/usr/bin/"
   cp "$(command -v busybox)" "$root/bin/busybox"
-  install -m 755 toolchain/cell-pc/init "$root/init"
+  install -m 755 toolchain/cell-pc/guest/init "$root/init"
+  install -m 644 toolchain/cell-pc/guest/shared.sh "$root/shared.sh"
   printf '%s\n' "jobs='$jobs'" "devices='${devices[*]}'" "realtime='$realtime'" >"$root/etc/cell-pc.conf"
-  for library in $(ldd "$root"/usr/bin/* | grep -o '/[^ ]*\.so[^ ]*' | sort -u); do
+  for library in $(find "$root/usr" "$scratch/unpacked/usr" -type f -perm -u+x -exec ldd {} + 2>/dev/null | grep -o '/[^ ]*\.so[^ ]*' | sort -u); do
     install -D -m 755 "$library" "$root$library"
   done
   (cd "$root" && find . -print0 | cpio --null --create --format=newc --quiet --owner=0:0 | gzip -1) >"$scratch/initramfs"
