@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "geometry/fit/matching_checks.hpp"
@@ -106,6 +107,13 @@ std::expected<BSplineSurfaceFit, MatchingFailure> BSplineSurfaceFit::assemble(
     return std::unexpected(MatchingFailure{.what = Error::too_few_stripes});
   const auto pivot = fit.system_.factor();
   if (!pivot) return std::unexpected(MatchingFailure{.what = Error::singular, .control = pivot.error()});
+  // Small pivots magnify rounding one after the other, so that a pivot which is nothing else may stand above each bound
+  // that is made of one. By this the control points' error bound is as large as they are.
+  const double no_digit_left = 1 / (4 * fit.half_band() * std::numeric_limits<double>::epsilon());
+  if (const double condition = fit.condition(); !(condition < no_digit_left)) {
+    return std::unexpected(
+        MatchingFailure{.what = Error::singular, .control = pivot->weakest, .condition = condition});
+  }
   fit.report_.pivot = *pivot;
   return fit;
 }

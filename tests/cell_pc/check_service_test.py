@@ -104,13 +104,16 @@ class Service(unittest.TestCase):
         def aborted(files): files["plate-18/summary.json"]["result"] = "aborted"
         self.refuses(aborted, "removed: the plate is aborted, promised stopped and saved")
         def twice(files): files["devices"] = "ended: 60 motions, 40 exposures, 44 s"
+        def unfinished(files): del files["plate-18/summary.json"]
+        self.refuses(unfinished, "removed: the plate is not there, promised stopped and saved",
+                     "finished: 36 exposures for 32 shots; what is saved must not be taken again")
         self.refuses(twice, "finished: 40 exposures for 35 shots; what is saved must not be taken again")
         def another_way(files): files["journal"] = "killed"
         self.refuses(another_way, "after a standstill: it was not the watchdog that ended it")
 
     def test_results_that_are_not_there(self):
         files = copy.deepcopy(GOOD)
-        del files["plate-18/summary.json"]
+        del files["journal"]
         code, told = check(files)
         self.assertEqual((code, len(told)), (1, 1))
         self.assertTrue(told[0].startswith("cell-pc: the results cannot be read: "), told)

@@ -47,19 +47,23 @@ def lines_of(path, separator):
     return {key.strip(): value.strip() for key, value in pairs}
 
 
+def json_of(path, otherwise):
+    return json.loads(path.read_text()) if path.exists() else otherwise
+
+
 def read(folder):
     folder = pathlib.Path(folder)
     devices = re.search(r"(\d+) exposures", (folder / "devices").read_text())
     return {"facts": lines_of(folder / "facts", "="), "process": lines_of(folder / "process", ":"),
             "threads": (folder / "threads").read_text().splitlines(), "journal": (folder / "journal").read_text(),
-            "finished": json.loads((folder / "plate-17/summary.json").read_text()),
-            "timing": json.loads((folder / "plate-17/timing.json").read_text()),
-            "removed": json.loads((folder / "plate-18/summary.json").read_text()),
+            "finished": json_of(folder / "plate-17/summary.json", {"result": "not there", "shots": {}}),
+            "timing": json_of(folder / "plate-17/timing.json", {}),
+            "removed": json_of(folder / "plate-18/summary.json", {"result": "not there", "shots": {}}),
             "exposures": int(devices.group(1)) if devices else None}
 
 
 def shots_in(summary):
-    return sum(summary["shots"][purpose] for purpose in ("seek", "boundary", "surface"))
+    return sum(summary["shots"].get(purpose, 0) for purpose in ("seek", "boundary", "surface"))
 
 
 def faults_of(found):
