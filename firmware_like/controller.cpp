@@ -83,8 +83,8 @@ void Controller::transmit_robot(hal::Instant now) {
 }
 
 // A cell that waits for a person has come to rest as far as one run of the program goes, unless a person can reach it:
-// what to do is in why(). What was measured leads to the same end each time, whoever is there, and a memory plan is made
-// at the start.
+// what to do is in why(). What was measured leads to the same end each time, whoever is there, and a memory plan is
+// made at the start.
 bool Controller::at_rest() const {
   const bool repeats = cell_.cause() >= tasks::HoldCause::plan;
   switch (cell_.state()) {

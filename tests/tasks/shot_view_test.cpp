@@ -111,8 +111,8 @@ TEST_CASE("a look that begins while the frame arrives sees what a look at the wh
       CHECK_FALSE(view.waits());
       CHECK(view.step());
       check_same(view, once);
-      // Left after the last point: to unpack it, to cut the last one or two of 13 groups of stripes, in four steps each,
-      // and to find the plate among the runs.
+      // Left after the last point: to unpack it, to cut the last one or two of 13 groups of stripes, in four steps
+      // each, and to find the plate among the runs.
       if (points_a_tick <= 4000) CHECK(last <= steps_at_once - 11 * 4 + 2);
     }
   }
