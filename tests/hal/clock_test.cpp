@@ -1,7 +1,9 @@
 #include "hal/clock.hpp"
 
 #include <doctest/doctest.h>
+#include <sys/time.h>
 
+#include <csignal>
 #include <ctime>
 
 using namespace moldloft::hal;
@@ -15,7 +17,43 @@ Duration monotonic() {
   return std::chrono::seconds{t.tv_sec} + std::chrono::nanoseconds{t.tv_nsec};
 }
 
+volatile std::sig_atomic_t interruptions = 0;
+void interrupt(int) { interruptions = interruptions + 1; }
+
+// Sends this process a signal every millisecond, with a handler that does not have sleeps taken up again.
+class Interruptions {
+ public:
+  Interruptions() {
+    struct sigaction action {};
+    action.sa_handler = interrupt;
+    ::sigaction(SIGALRM, &action, &before_);
+    const itimerval often{.it_interval = {0, 1000}, .it_value = {0, 1000}};
+    ::setitimer(ITIMER_REAL, &often, nullptr);
+  }
+  ~Interruptions() {
+    const itimerval never{};
+    ::setitimer(ITIMER_REAL, &never, nullptr);
+    ::sigaction(SIGALRM, &before_, nullptr);
+  }
+  Interruptions(const Interruptions&) = delete;
+  Interruptions& operator=(const Interruptions&) = delete;
+
+ private:
+  struct sigaction before_ {};
+};
+
 }  // namespace
+
+TEST_CASE("a sleep that signals interrupt goes on to its deadline") {
+  SteadyClock clock;
+  const Instant wake = clock.now() + 100ms;
+  {
+    const Interruptions every_millisecond;
+    clock.sleep_until(wake);
+  }
+  CHECK(clock.now() >= wake);
+  CHECK(interruptions > 0);
+}
 
 TEST_CASE("periodic work begins half a millisecond beside the kernel's, soon and not in the past") {
   for (int i = 0; i < 100; ++i) {

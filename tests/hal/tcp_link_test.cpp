@@ -1,6 +1,7 @@
 #include "hal/tcp_link.hpp"
 
 #include <doctest/doctest.h>
+#include <netinet/tcp.h>
 
 #include <functional>
 #include <string>
@@ -41,6 +42,27 @@ TEST_CASE("a connection that is refused is lost with a reason, and open() does n
   REQUIRE(comes_to(*link, LinkState::lost));
   CHECK(std::string{link->why()} ==
         "127.0.0.1:" + std::to_string(port) + ": Connection refused (is the server running?)");
+}
+
+TEST_CASE("requests leave at once: the socket does not hold small ones back to merge them") {
+  LoopbackServer server;
+  const auto link = make_tcp_link("127.0.0.1", server.port());
+  link->open();
+  REQUIRE(comes_to(*link, LinkState::open));
+  // The link's own descriptor, told by whom it is connected to.
+  int found = 0;
+  for (int handle = 3; handle < 1024; ++handle) {
+    sockaddr_in peer{};
+    socklen_t size = sizeof peer;
+    if (::getpeername(handle, reinterpret_cast<sockaddr*>(&peer), &size) != 0) continue;
+    if (peer.sin_family != AF_INET || ntohs(peer.sin_port) != server.port()) continue;
+    ++found;
+    int no_delay = 0;
+    size = sizeof no_delay;
+    REQUIRE(::getsockopt(handle, IPPROTO_TCP, TCP_NODELAY, &no_delay, &size) == 0);
+    CHECK(no_delay != 0);
+  }
+  CHECK(found == 1);
 }
 
 TEST_CASE("opening is a state: an address that never answers keeps it without holding up the caller") {

@@ -54,6 +54,20 @@ TEST_CASE("merging two histograms is the same as adding all values to one") {
   for (const double f : {0.1, 0.5, 0.99}) CHECK(a.percentile(f) == all.percentile(f));
 }
 
+TEST_CASE("one value alone is its own minimum and mean, with no deviation, zero is a value like others") {
+  for (const auto value : {0ns, 1ns, 70'000'000ns}) {
+    Histogram histogram;
+    histogram.add(value);
+    CHECK(histogram.min() == value);
+    CHECK(histogram.max() == value);
+    CHECK(histogram.mean() == value);
+    CHECK(histogram.standard_deviation() == 0ns);
+    histogram.add(value + 2us);
+    CHECK(histogram.min() == value);
+    CHECK(histogram.mean() == value + 1us);
+  }
+}
+
 TEST_CASE("an empty histogram answers zero") {
   const Histogram histogram;
   CHECK(histogram.min() == 0ns);
