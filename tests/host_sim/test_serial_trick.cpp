@@ -47,20 +47,26 @@ class Robot {
   std::thread thread_;
 };
 
-int probe(const std::string& device, bool with_shim) {
+pid_t start_probe(const std::string& device, bool with_shim, const char* until_hang_up = nullptr) {
   const pid_t child = ::fork();
   if (child == 0) {
     if (with_shim) ::setenv("LD_PRELOAD", PTY_MODEM, 1);
     const int null = ::open("/dev/null", O_WRONLY);
     ::dup2(null, 1);
     ::dup2(null, 2);
-    ::execl(SERIAL_PROBE, SERIAL_PROBE, device.c_str(), nullptr);
+    ::execl(SERIAL_PROBE, SERIAL_PROBE, device.c_str(), until_hang_up, nullptr);
     ::_exit(127);
   }
+  return child;
+}
+
+int exit_code_of(pid_t child) {
   int status = 0;
   ::waitpid(child, &status, 0);
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
+
+int probe(const std::string& device, bool with_shim) { return exit_code_of(start_probe(device, with_shim)); }
 
 }  // namespace
 
@@ -72,6 +78,23 @@ TEST_CASE("the controller's own serial driver opens the robot's pseudo-terminal,
   hal::SteadyClock clock;
   clock.sleep_until(clock.now() + 20ms);
   CHECK(probe(name_of_this_test(), true) == 0);  // after the first has hung up
+}
+
+TEST_CASE("a serial line that is silent is open, one whose far end has gone is lost") {
+  auto link = PtyLink::create(name_of_this_test());
+  REQUIRE_MESSAGE(link.has_value(), link.error().what);
+  const pid_t listener = start_probe(name_of_this_test(), true, "until the far end is gone");
+  hal::SteadyClock clock;
+  std::byte bytes[8];
+  std::size_t heard = 0;
+  while (heard == 0 && clock.now() < 5s) {
+    if ((*link)->state() == hal::LinkState::open) heard = (*link)->read(bytes);
+    clock.sleep_until(clock.now() + 1ms);
+  }
+  CHECK(heard == 1);
+  clock.sleep_until(clock.now() + 200ms);
+  link->reset();
+  CHECK(exit_code_of(listener) == 0);
 }
 
 TEST_CASE("without the shim libserialport refuses it: the shim is what makes it work") {
