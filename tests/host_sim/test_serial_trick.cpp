@@ -83,6 +83,7 @@ TEST_CASE("the controller's own serial driver opens the robot's pseudo-terminal,
 TEST_CASE("a serial line that is silent is open, one whose far end has gone is lost") {
   auto link = PtyLink::create(name_of_this_test());
   REQUIRE_MESSAGE(link.has_value(), link.error().what);
+  (*link)->open();
   const pid_t listener = start_probe(name_of_this_test(), true, "until the far end is gone");
   hal::SteadyClock clock;
   std::byte bytes[8];
