@@ -33,10 +33,10 @@ for program in moldloft moldloft-sim setup_probe serial_probe; do
   chmod +x "$bin/$program"
 done
 
-# What says something about the emulator: it has a thread of its own in each process, runs this machine's kernel, and does
-# not tell a program that starts another why that failed.
+# What says something about the emulator: it has a thread of its own in each process, does not tell a program that starts
+# another why that failed, and holds memory that a limit on what may be locked does not foresee.
 emulators="a cyclictest that is not there*,only the control thread is scheduled*,a program that was started under chrt*"
-emulators+=",what the configuration does not ask for*"
+emulators+=",what the configuration does not ask for*,without rights nothing is had*,a finite limit on locked memory*"
 failed=0
 for test in "${tests[@]}"; do
   echo "== $test"
