@@ -17,8 +17,8 @@ if [ "${1-}" = --tests ]; then
   # Clang, whose checks prove that the control thread does not wait: 50 MiB to fetch, 280 MiB installed.
   packages+=(clang-22 libclang-rt-22-dev)
   # The Debian package (its dependencies named by dpkg-dev, its unit checked by systemd), and the emulated cell PC, whose
-  # kernel is taken out of its package.
-  packages+=(dpkg-dev systemd python3 cpio busybox-static rt-tests qemu-system-x86)
+  # kernel is taken out of its package and which runs systemd and udev as they are here.
+  packages+=(dpkg-dev systemd udev python3 cpio busybox-static rt-tests qemu-system-x86)
   [ "$(dpkg --print-architecture)" = amd64 ] && wanted+=(linux-image-rt-amd64)
 fi
 [ "${1-}" = --aarch64 ] && packages+=(dpkg-dev g++-aarch64-linux-gnu qemu-user)

@@ -11,13 +11,6 @@ toolchain/aarch64/sysroot.sh
 tests=("$@")
 [ ${#tests[@]} -gt 0 ] || tests=(test_hal test_tasks test_geometry test_firmware_like test_host_sim)
 
-cmake --preset aarch64 -D MOLDLOFT_TESTS=ON -D MOLDLOFT_GEOMETRY_ONLY=OFF >/dev/null
-cmake --build --preset aarch64 --target moldloft "${tests[@]}"
-(cd build/aarch64 && DPKG_ADMINDIR=$PWD/../aarch64-sysroot/var/lib/dpkg cpack -B . | grep generated)
-depends=$(dpkg-deb -f build/aarch64/moldloft_*_arm64.deb Depends)
-[[ $depends == *libc6* ]] || { echo "aarch64: the package names no libraries that it needs: '$depends'" >&2; exit 1; }
-echo "depends: $depends"
-
 # A test that starts a program asks this machine's kernel for it, which knows no arm64: under each program's name stands a
 # script meanwhile that emulates it. The programs themselves are back in their places at the end.
 bin=$PWD/build/aarch64/bin
@@ -26,6 +19,15 @@ put_back() {
   for program in "$bin"/*.arm64; do [ ! -e "$program" ] || mv "$program" "${program%.arm64}"; done
 }
 trap put_back EXIT
+put_back  # after a run that was killed: what is built and packaged are the programs
+
+cmake --preset aarch64 -D MOLDLOFT_TESTS=ON -D MOLDLOFT_GEOMETRY_ONLY=OFF >/dev/null
+cmake --build --preset aarch64 --target moldloft "${tests[@]}"
+(cd build/aarch64 && DPKG_ADMINDIR=$PWD/../aarch64-sysroot/var/lib/dpkg cpack -B . | grep generated)
+depends=$(dpkg-deb -f build/aarch64/moldloft_*_arm64.deb Depends)
+[[ $depends == *libc6* ]] || { echo "aarch64: the package names no libraries that it needs: '$depends'" >&2; exit 1; }
+echo "depends: $depends"
+
 for program in moldloft moldloft-sim setup_probe serial_probe; do
   [ -e "$bin/$program" ] || continue
   mv "$bin/$program" "$bin/$program.arm64"

@@ -40,6 +40,9 @@ cannot() { echo "cell-pc: skipped: $1" >&2; exit 77; }
 for program in qemu-system-x86_64 cyclictest cpio busybox dpkg-deb; do
   command -v $program >/dev/null || cannot "$program is missing; toolchain/setup.sh --tests installs what there is"
 done
+for program in systemctl udevadm; do
+  [ "$jobs" != service ] || command -v $program >/dev/null || cannot "$program is missing; toolchain/setup.sh --tests installs it"
+done
 [ "$(dpkg --print-architecture)" = amd64 ] || cannot "the emulated PC is an amd64 machine and runs this machine's programs"
 
 scratch=$(mktemp -d)
