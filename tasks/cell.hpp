@@ -203,6 +203,8 @@ class Cell final : public Task {
   HeightModel heights_;
   std::vector<ShotPlace> boundary_places_, surface_places_;
   std::size_t surface_planned_ = 0, surface_next_ = 0;
+  ZigzagPlan zigzag_;
+  bool plan_begun_ = false;  // the zig-zag is begun
   std::array<int, 3> taken_{};
   int retaken_ = 0;
   std::uint64_t points_seen_ = 0;

@@ -40,6 +40,7 @@ void Cell::measure() {
   set_phase(Phase::seek_edge);
   boundary_places_.clear();
   surface_planned_ = surface_next_ = 0;
+  plan_begun_ = false;
   heights_.reset();
   surface_.begin();
   tracker_.begin(settings_.start);
@@ -180,10 +181,17 @@ void Cell::use_boundary_shot(const Order& order, const geometry::RigidMotion& wo
     want(*step.next, step.to == TrackState::seek_edge ? ShotPurpose::seek : ShotPurpose::boundary);
 }
 
+// In the slack: what the rows of a zig-zag cost belongs into no tick.
 void Cell::plan_surface() {
-  const auto& last = boundary_places_.back();
-  const auto planned = plan_zigzag(surface_.outline(), heights_, settings_.scan, last.centre.head<2>(),
-                                   last.head_yaw, surface_places_);
+  if (!plan_begun_) {
+    const auto& last = boundary_places_.back();
+    zigzag_.begin(surface_.outline(), heights_, settings_.scan, last.centre.head<2>(), last.head_yaw,
+                  surface_places_);
+    surface_.plan(zigzag_);
+    plan_begun_ = true;
+  }
+  if (surface_.planning()) return;
+  const auto planned = zigzag_.result();
   if (!planned) {
     return hold(HoldCause::plan, "the plate needs more shots than are planned for: raise [plate] largest_mm");
   }

@@ -19,6 +19,7 @@ void SurfaceTask::begin() {
   stage_ = Stage::idle;
   looking_at_ = nullptr;
   keeping_from_ = nullptr;
+  planning_ = nullptr;
   reserve_.clear();
   reserve_ends_.clear();
   reserve_next_ = reserve_shot_ = 0;
@@ -69,9 +70,9 @@ void SurfaceTask::solve() {
 }
 
 bool SurfaceTask::has_work() const {
-  return can_look() || keeping() || stage_ == Stage::choosing_corners || stage_ == Stage::building_outline ||
-         stage_ == Stage::clearing || stage_ == Stage::folding_reserve || stage_ == Stage::folding ||
-         stage_ == Stage::solving;
+  return can_look() || keeping() || planning() || stage_ == Stage::choosing_corners ||
+         stage_ == Stage::building_outline || stage_ == Stage::clearing || stage_ == Stage::folding_reserve ||
+         stage_ == Stage::folding || stage_ == Stage::solving;
 }
 
 void SurfaceTask::step(Instant) {
@@ -80,6 +81,10 @@ void SurfaceTask::step(Instant) {
     return;
   }
   if (keeping()) return step_keep();
+  if (planning()) {
+    if (planning_->step()) planning_ = nullptr;
+    return;
+  }
   switch (stage_) {
     case Stage::choosing_corners:
       return step_corners();

@@ -1,4 +1,4 @@
-// The geometry that runs in the slack of the ticks: outline from the edge points, plan map, surface fit. The
+// The geometry that runs in the slack of the ticks: outline from the edge points, scan plan, plan map, surface fit. The
 // cell asks for the next piece of work and looks now and then whether it is done.
 //
 // Boundary shots come before the outline is known, so their points cannot be folded into the fit yet: every
@@ -23,6 +23,7 @@
 #include "geometry/fit/surface_fit.hpp"
 #include "geometry/rigid_motion.hpp"
 #include "hal/realtime.hpp"
+#include "tasks/scan_plan.hpp"
 #include "tasks/scheduler.hpp"
 #include "tasks/shot_view.hpp"
 
@@ -44,10 +45,10 @@ class SurfaceTask final : public BackgroundTask {
     idle,
     choosing_corners,
     building_outline,
-    clearing,         // of what the surface before left
-    folding_reserve,  // the outline is ready; shots of the surface may be planned
-    open,             // takes the next shot
-    folding,          // a shot's points; the frame must stay as it is
+    clearing,  // of what the surface before left; the outline is ready
+    folding_reserve,
+    open,     // takes the next shot
+    folding,  // a shot's points; the frame must stay as it is
     solving,
     ready,
     failed,
@@ -68,6 +69,9 @@ class SurfaceTask final : public BackgroundTask {
   // `corner_candidates`: what the tracker took for corners; more than four is no harm.
   void build_outline(std::span<const Eigen::Vector2d> edges,
                      std::span<const Eigen::Vector2d> corner_candidates) MOLDLOFT_NONBLOCKING;
+  // Plans which shots cover the outline, which is ready; planning() turns false when it is done. Goes before the fit.
+  void plan(ZigzagPlan& zigzag) { planning_ = &zigzag; }
+  bool planning() const { return planning_ != nullptr; }
   // Folds a surface shot in; `shot` and its frame stay untouched by others until stage() is open again.
   void fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner) MOLDLOFT_NONBLOCKING;
   void solve() MOLDLOFT_NONBLOCKING;
@@ -77,7 +81,7 @@ class SurfaceTask final : public BackgroundTask {
   std::size_t next_kind() const override { return can_look() ? looking_at_->next_kind() : 0; }
 
   Stage stage() const { return stage_; }
-  bool outline_ready() const { return stage_ >= Stage::folding_reserve && stage_ != Stage::failed; }
+  bool outline_ready() const { return stage_ >= Stage::clearing && stage_ != Stage::failed; }
   geometry::Error error() const { return error_; }
   const geometry::Outline& outline() const { return outline_.outline(); }
   const geometry::SurfaceFit& fit() const { return fit_; }
@@ -118,6 +122,7 @@ class SurfaceTask final : public BackgroundTask {
   ShotView* shot_ = nullptr;
   ShotView* looking_at_ = nullptr;
   ShotView* keeping_from_ = nullptr;
+  ZigzagPlan* planning_ = nullptr;
   std::size_t keep_end_ = 0;  // of the reserve, for the shot at hand
   int map_row_ = -1;          // of the plan map's check; -1: the outline is not there yet
   geometry::RigidMotion world_from_scanner_;
