@@ -2,6 +2,7 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -109,4 +110,40 @@ TEST_CASE("the zig-zag begins near the arm and never jumps over a row") {
 TEST_CASE("more shots than the plan holds is a typed error") {
   std::array<ShotPlace, 8> places;
   CHECK(plan_zigzag(straight(square), {}, {0, 0}, 0, places).error() == geometry::Error::capacity);
+}
+
+TEST_CASE("a step of the plan is never more than a row") {
+  std::array<ShotPlace, 64> places;
+  places.fill({.head_yaw = NAN});
+  const auto outline = straight(square);
+  const HeightModel flat;
+  ZigzagPlan plan;
+  plan.begin(outline, flat, {}, {0, 0}, 0, places);
+  const auto filled = [&] {
+    return std::count_if(places.begin(), places.end(),
+                         [](const ShotPlace& p) { return !std::isnan(p.head_yaw); });
+  };
+  int steps = 1;
+  std::ptrdiff_t before = 0;
+  for (; !plan.step(); ++steps) {
+    CHECK(filled() - before <= 4);
+    before = filled();
+  }
+  CHECK(filled() == 16);
+  CHECK(steps == 4 + 1 + 4);  // the outline's sides, the turn to the plate, four rows of four
+}
+
+TEST_CASE("a plan begun anew owes nothing to the one before") {
+  std::array<ShotPlace, 64> places, again;
+  const auto outline = straight(square), other = straight(sheared);
+  const HeightModel flat;
+  ZigzagPlan plan;
+  plan.begin(other, flat, {}, {390, 280}, 1, again);
+  for (int i = 0; i < 7; ++i) plan.step();
+  plan.begin(outline, flat, {}, {0, 0}, 0, again);
+  while (!plan.step()) {
+  }
+  const std::size_t count = plan_zigzag(outline, {}, {0, 0}, 0, places).value();
+  REQUIRE(plan.result().value() == count);
+  for (std::size_t i = 0; i < count; ++i) CHECK(again[i].centre == places[i].centre);
 }

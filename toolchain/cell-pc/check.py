@@ -18,6 +18,10 @@ TICK_US = 1000.0
 # devices, whose bytes cross the cable when the emulator looks: it is held to no missed tick and to the maximum.
 SELF_TEST = "latency"
 
+# The row of the task table that makes no system call: what it takes is all ours. In the drivers' rows the kernel also does
+# the work of the link's far end, which is in the same machine here.
+COMPUTES = "cell"
+
 
 def percentile(histogram, fraction):
     """Of cyclictest's histogram {"us": count}: the smallest value that so many samples do not exceed.
@@ -53,6 +57,7 @@ def read(folder):
 
 def faults_of(found):
     yield from faults_of_the_cell(found)
+    yield from faults_of_the_budget(found)
     yield from faults_of_waking(found)
 
 
@@ -69,6 +74,12 @@ def faults_of_the_cell(found):
     for row in timing.get("setup", []):
         if not row["ok"]:
             yield f"{row['what']}: {row['got']}, wanted {row['wanted']}"
+
+
+def faults_of_the_budget(found):
+    for row in found["timing"]["tasks"]:
+        if row["name"] == COMPUTES and row["overruns"] != 0:
+            yield f"{COMPUTES}: {row['overruns']} runs over its budget of {row['budget_us']:.0f} us, the longest {row['cost']['max_us']:.0f}"
 
 
 def faults_of_waking(found):
