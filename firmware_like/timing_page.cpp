@@ -66,8 +66,7 @@ std::string figure(const Json& value) {
   if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
   if (value.is_string()) return value.get<std::string>().empty() ? "none" : escaped(value.get<std::string>());
   if (value.is_number_integer()) return fmt::format("{}", value.get<std::int64_t>());
-  const double v = value.get<double>();
-  return fmt::format("{:.{}f}", v, v < 10 ? 2 : v < 100 ? 1 : 0);
+  return readable(value.get<double>());
 }
 
 std::string figure(const Json& j, const char* key) {
@@ -171,7 +170,9 @@ std::string wake_up(const Json& t) {
   if (!measured(t, "wake_up")) return "";
   return section(
       "How late a tick begins",
-      "From the time at which a tick is due to the moment at which the control thread runs.",
+      fmt::format("From the time at which a tick is due to the moment at which the control thread runs. The "
+                  "latest came at {} s.",
+                  moment_s(t, "latest_wake_up_at_ms")),
       log_plot({.series = {{"ours", histogram_from(t.at("wake_up"))}}, .label = "wake-up latency"}));
 }
 
@@ -219,21 +220,34 @@ std::string tasks_section(const Json& t) {
                  count_cell(task, "slips"),
                  count_cell(task, "late_starts"),
                  {figure(task, "lateness_us")},
-                 count_cell(task, "overruns")});
+                 count_cell(task, "overruns"),
+                 {moment_s(task, "longest_at_ms")}});
   for (const auto& task : t.at("background"))
     background += row({{escaped(task.at("name").get<std::string>())},
                        {figure(task, "runs")},
                        {figure(task, "refused")},
                        {figure(task, "forced")},
-                       {figure(task, "overruns")}});
+                       {figure(task, "overruns")},
+                       {moment_s(task, "longest_at_ms")}});
   return section(
       "Tasks",
       "A slip is a run that fell into a missed tick; a late start began after the budgets of the tasks "
-      "before it; an overrun took longer than its budget. Refused: a tick whose slack was too short.",
-      table(
-          {{"task"}, {"every n ticks"}, {"runs"}, {"slips"}, {"late starts"}, {"lateness, us"}, {"overruns"}},
-          rows) +
-          table({{"background"}, {"steps"}, {"refused"}, {"forced"}, {"beyond the quantum"}}, background));
+      "before it; an overrun took longer than its budget. Refused: a tick whose slack was too short. The "
+      "longest run "
+      "began at the time of the run given last: the events and the flight recorder's dumps tell what was "
+      "then.",
+      table({{"task"},
+             {"every n ticks"},
+             {"runs"},
+             {"slips"},
+             {"late starts"},
+             {"lateness, us"},
+             {"overruns"},
+             {"longest at, s"}},
+            rows) +
+          table(
+              {{"background"}, {"steps"}, {"refused"}, {"forced"}, {"beyond the quantum"}, {"longest at, s"}},
+              background));
 }
 
 std::string misses(const Json& t) {
@@ -244,7 +258,7 @@ std::string misses(const Json& t) {
       lead += fmt::format("{}{}: {}", lead.empty() ? "" : ", ", escaped(cause), count.get<std::uint64_t>());
   std::string rows;
   for (const auto& m : t.at("first_misses"))
-    rows += row({{fmt::format("{:.3f}", m.at("t_ms").get<double>() / 1000)},
+    rows += row({{moment_s(m, "t_ms")},
                  {figure(m, "lost")},
                  {figure(m, "cause"), "word"},
                  {figure(m, "late_us")},

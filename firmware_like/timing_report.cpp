@@ -1,5 +1,7 @@
 #include "firmware_like/timing_report.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -65,6 +67,11 @@ void put_misses(Json& j, const tasks::Scheduler& s) {
                                  {"late_us", micros(m.late)},
                                  {"tick_took_us", micros(m.wall)},
                                  {"of_that_on_the_processor_us", micros(m.spent)}});
+}
+
+// When the longest of what the histogram counts began.
+Json millis_of_longest(const Histogram& h, hal::Instant at) {
+  return h.empty() ? Json(nullptr) : Json(millis(at));
 }
 
 double total_ns(const Histogram& h) {
@@ -145,6 +152,7 @@ void put_tasks(Json& j, const tasks::Scheduler& s) {
                           {"late_starts", t.late_starts},
                           {"lateness_us", micros(t.lateness)},
                           {"overruns", t.overruns},
+                          {"longest_at_ms", millis_of_longest(t.cost, t.longest_at)},
                           {"cost", histogram_json(t.cost)}});
   }
   j["background"] = Json::array();
@@ -155,11 +163,19 @@ void put_tasks(Json& j, const tasks::Scheduler& s) {
                                {"refused", t.refused},
                                {"forced", t.forced},
                                {"overruns", t.overruns},
+                               {"longest_at_ms", millis_of_longest(t.cost, t.longest_at)},
                                {"cost", histogram_json(t.cost)}});
   }
 }
 
 }  // namespace
+
+std::string readable(double v) { return fmt::format("{:.{}f}", v, v < 10 ? 2 : v < 100 ? 1 : 0); }
+
+std::string moment_s(const Json& j, const char* key) {
+  const bool known = j.contains(key) && j.at(key).is_number();
+  return known ? fmt::format("{:.3f}", j.at(key).get<double>() / 1000) : "-";
+}
 
 double micros(hal::Duration d) { return std::chrono::duration<double, std::micro>(d).count(); }
 
@@ -205,6 +221,7 @@ Json timing_report(const TimedRun& run) {
   j["ticks"] = s.ticks();
   put_misses(j, s);
   j["wake_up"] = histogram_json(s.wake_up());
+  j["latest_wake_up_at_ms"] = millis_of_longest(s.wake_up(), s.latest_wake_up());
   j["execution"] = histogram_json(s.execution());
   j["slack"] = histogram_json(s.slack());
   j["pushed_by_background"] = histogram_json(s.pushed());

@@ -13,6 +13,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "firmware_like/controller.hpp"
@@ -43,6 +44,11 @@ double micros(hal::Duration);
 Json histogram_json(const tasks::Histogram&);
 tasks::Histogram histogram_from(
     const Json&);  // of what histogram_json() wrote; within a bucket, as exact as that
+
+// As many places as people read: 7.25, 72.5, 725.
+std::string readable(double);
+// The moment kept in milliseconds under `key`, in seconds as events and flight recorder give it; "-" where none is.
+std::string moment_s(const Json&, const char* key);
 
 // ---- budgets
 

@@ -10,12 +10,7 @@ namespace {
 constexpr int name_width = 20;
 constexpr int result_width = 28;  // as the table of a run's result has it
 
-// A figure with as many places as a person reads: 7.25, 72.5, 725, 7250.
-std::string figure(const Json& value) {
-  if (!value.is_number()) return "-";
-  const double v = value.get<double>();
-  return fmt::format("{:.{}f}", v, v < 10 ? 2 : v < 100 ? 1 : 0);
-}
+std::string figure(const Json& value) { return value.is_number() ? readable(value.get<double>()) : "-"; }
 
 std::string text(const Json& j, const char* key) {
   return j.contains(key) && j.at(key).is_string() ? j.at(key).get<std::string>() : std::string{};
@@ -74,8 +69,8 @@ std::string first_misses(const Json& t) {
   std::string s = fmt::format(columns, "at, s", "lost", "cause", "late, us", "took, us", "computed, us",
                               "  longest task");
   for (const auto& m : t.at("first_misses"))
-    s += fmt::format(columns, fmt::format("{:.3f}", m.at("t_ms").get<double>() / 1000), number(m, "lost"),
-                     text(m, "cause"), figure(m.at("late_us")), figure(m.at("tick_took_us")),
+    s += fmt::format(columns, moment_s(m, "t_ms"), number(m, "lost"), text(m, "cause"),
+                     figure(m.at("late_us")), figure(m.at("tick_took_us")),
                      figure(m.at("of_that_on_the_processor_us")),
                      text(m, "task") == "none" ? "" : "  " + text(m, "task"));
   return s;
@@ -96,19 +91,26 @@ std::string load(const Json& t) {
                      percent("background"), percent("idle"));
 }
 
+std::string latest_wake_up(const Json& t) {
+  if (number(t.at("wake_up"), "count") == 0) return "not measured";
+  return fmt::format("{} us late, at {} s", figure(t.at("wake_up").at("max_us")),
+                     moment_s(t, "latest_wake_up_at_ms"));
+}
+
 std::string task_counts(const Json& t) {
-  std::string s = fmt::format("{:<{}}{:>9}{:>8}{:>13}{:>14}{:>10}\n", "tasks", name_width, "runs", "slips",
-                              "late starts", "lateness, us", "overruns");
+  constexpr auto columns = "{:<{}}{:>9}{:>8}{:>13}{:>14}{:>10}{:>15}\n";
+  std::string s = fmt::format(columns, "tasks", name_width, "runs", "slips", "late starts", "lateness, us",
+                              "overruns", "longest at, s");
   for (const auto& task : t.at("tasks"))
-    s += fmt::format("{:<{}}{:>9}{:>8}{:>13}{:>14}{:>10}\n", "  " + text(task, "name"), name_width,
-                     number(task, "runs"), number(task, "slips"), number(task, "late_starts"),
-                     figure(task.at("lateness_us")), number(task, "overruns"));
-  s += fmt::format("{:<{}}{:>9}{:>8}{:>13}{:>14}{:>10}\n", "background", name_width, "runs", "forced",
-                   "refused", "", "overruns");
+    s += fmt::format(columns, "  " + text(task, "name"), name_width, number(task, "runs"),
+                     number(task, "slips"), number(task, "late_starts"), figure(task.at("lateness_us")),
+                     number(task, "overruns"), moment_s(task, "longest_at_ms"));
+  s += fmt::format(columns, "background", name_width, "runs", "forced", "refused", "", "overruns",
+                   "longest at, s");
   for (const auto& task : t.at("background"))
-    s += fmt::format("{:<{}}{:>9}{:>8}{:>13}{:>14}{:>10}\n", "  " + text(task, "name"), name_width,
-                     number(task, "runs"), number(task, "forced"), number(task, "refused"), "",
-                     number(task, "overruns"));
+    s += fmt::format(columns, "  " + text(task, "name"), name_width, number(task, "runs"),
+                     number(task, "forced"), number(task, "refused"), "", number(task, "overruns"),
+                     moment_s(task, "longest_at_ms"));
   return s;
 }
 
@@ -168,8 +170,9 @@ std::string comparison(const Json& t) {
 
 std::string timing_table(const Json& t) {
   return comparison(t) + histograms(t) + "\n" + line("missed ticks", name_width, missed(t)) +
-         first_misses(t) + line("load", name_width, load(t)) + system_counts(t) + "\n" + task_counts(t) +
-         "\n" + budgets(t) + "\n" + line("representative", name_width, in_lines(verdict(t), name_width));
+         first_misses(t) + line("latest wake-up", name_width, latest_wake_up(t)) +
+         line("load", name_width, load(t)) + system_counts(t) + "\n" + task_counts(t) + "\n" + budgets(t) +
+         "\n" + line("representative", name_width, in_lines(verdict(t), name_width));
 }
 
 std::string timing_lines(const Json& t) {

@@ -7,6 +7,23 @@ namespace moldloft::tasks {
 
 using hal::FlightKind;
 
+namespace {
+
+bool is_longest(const Histogram& so_far, Duration d) { return so_far.empty() || d > so_far.max(); }
+
+// What control tasks and background work have in common; true when the run kept what was declared.
+template <class Record>
+bool add_run(Record& record, Instant began, Duration cost, Duration declared) {
+  ++record.runs;
+  if (is_longest(record.cost, cost)) record.longest_at = began;
+  record.cost.add(cost);
+  if (cost <= declared) return true;
+  ++record.overruns;
+  return false;
+}
+
+}  // namespace
+
 int Scheduler::add(const TaskSpec& spec, Task& task) {
   assert(task_count_ < max_tasks && spec.period_ticks > 0 && spec.offset_ticks < spec.period_ticks);
   tasks_[task_count_] = &task;
@@ -49,7 +66,10 @@ bool Scheduler::run_tick() {
   longest_task_ = no_task;
   longest_cost_ = Duration{0};
   if (flight_ != nullptr) flight_->tick(woken_, woken_ - next_tick_, number_);
-  if (warm()) wake_up_.add(woken_ - next_tick_);
+  if (warm()) {
+    if (is_longest(wake_up_, woken_ - next_tick_)) latest_wake_up_ = woken_;
+    wake_up_.add(woken_ - next_tick_);
+  }
 
   run_table(next_tick_, t);
   const Instant following = next_tick_ + settings_.tick;
@@ -100,14 +120,11 @@ void Scheduler::run_table(Instant tick_start, Instant& t) {
 void Scheduler::count_run(std::size_t i, Instant began, Duration cost, Instant allowed_start) {
   if (!warm()) return;
   TaskRecord& record = records_[i];
-  ++record.runs;
-  record.cost.add(cost);
   if (began > allowed_start) {
     ++record.late_starts;
     record.lateness += began - allowed_start;
   }
-  if (cost <= record.spec.budget) return;
-  ++record.overruns;
+  if (add_run(record, began, cost, record.spec.budget)) return;
   if (flight_ != nullptr && record.spec.criticality == Criticality::vital)
     flight_->trigger(hal::FlightCause::overrun, static_cast<int>(i), began + cost);
 }
@@ -154,13 +171,13 @@ bool Scheduler::step_background(std::size_t i, Instant& t, Instant limit, bool& 
     const bool starving = ticks_ - last_run_tick_[i] >= settings_.starvation_ticks;
     const Instant due = limit + settings_.guard;
     if (!starving || !may_force || t > due || t + record.spec.quantum > due + settings_.late_tolerance) {
-      if (last_run_tick_[i] != ticks_) ++record.refused;
+      if (last_run_tick_[i] != ticks_ && warm()) ++record.refused;
       if (peak_[i][kind] > record.spec.quantum)
         peak_[i][kind] = std::max(record.spec.quantum, peak_[i][kind] / 2);
       return false;
     }
     may_force = false;
-    ++record.forced;
+    if (warm()) ++record.forced;
   }
 
   const int id = background_base + static_cast<int>(i);
@@ -173,9 +190,7 @@ bool Scheduler::step_background(std::size_t i, Instant& t, Instant limit, bool& 
   if (flight_ != nullptr) flight_->note(FlightKind::background, id, began, cost);
   follow_peak(i, kind, cost);
   last_run_tick_[i] = ticks_;
-  ++record.runs;
-  record.cost.add(cost);
-  if (cost > record.spec.quantum) ++record.overruns;
+  if (warm()) add_run(record, began, cost, record.spec.quantum);
   if (cost > longest_cost_) {
     longest_cost_ = cost;
     longest_task_ = id;

@@ -91,9 +91,10 @@ class Scheduler {
   std::span<const BackgroundRecord> background() const {
     return {background_records_.data(), background_count_};
   }
-  const Histogram& wake_up() const { return wake_up_; }      // how late a tick began
-  const Histogram& execution() const { return execution_; }  // what the whole table took
-  const Histogram& slack() const { return slack_; }          // left over when the table was done
+  const Histogram& wake_up() const { return wake_up_; }       // how late a tick began
+  Instant latest_wake_up() const { return latest_wake_up_; }  // when the latest of them came
+  const Histogram& execution() const { return execution_; }   // what the whole table took
+  const Histogram& slack() const { return slack_; }           // left over when the table was done
   // By how much the background work of a tick moved the next one; 0 where it did not.
   const Histogram& pushed() const { return pushed_; }
   const SchedulerSettings& settings() const { return settings_; }
@@ -120,7 +121,7 @@ class Scheduler {
   std::array<std::array<Duration, step_kinds>, max_background> peak_{};
   std::array<std::uint64_t, max_background> last_run_tick_{};
   std::size_t task_count_ = 0, background_count_ = 0, next_background_ = 0;
-  Instant next_tick_{0}, woken_{0};
+  Instant next_tick_{0}, woken_{0}, latest_wake_up_{0};
   Duration spent_before_{0};  // the thread's processor time when it went to sleep
   std::uint64_t number_ = 0;  // of the next tick, missed ones included: decides which tasks are due
   std::uint64_t ticks_ = 0, missed_ = 0, started_after_ = 0;

@@ -19,6 +19,7 @@ struct TaskRecord {
   std::uint64_t overruns = 0;     // took longer than its budget
   Duration lateness{0};           // of all late starts together, beyond what those budgets allow
   Histogram cost;                 // from its start to its end by the clock, preemption included
+  Instant longest_at{0};          // when the longest run began
 };
 
 struct BackgroundRecord {
@@ -28,6 +29,7 @@ struct BackgroundRecord {
   std::uint64_t refused = 0;   // ticks in which it had work and did not fit into the slack
   std::uint64_t forced = 0;    // run all the same, so that it does not starve
   Histogram cost;
+  Instant longest_at{0};  // when the longest step began
 };
 
 // Whose fault a missed tick is: of the three parts that made it late, the largest.

@@ -46,7 +46,8 @@ TEST_CASE("there is background work in every tick of the self-test, once it has 
   hal::VirtualClock clock;
   const auto load = std::make_unique<LatencyLoad>(small_scanner(), clock);
   load->scheduler().start();
-  load->scheduler().run_tick();
+  for (std::uint32_t i = 0; i <= load->scheduler().settings().warm_up_ticks; ++i)
+    load->scheduler().run_tick();
   const auto before = load->scheduler().background()[0].runs;
   std::uint64_t idle_ticks = 0, runs = before;
   for (int i = 0; i < 2000; ++i) {

@@ -226,6 +226,51 @@ TEST_CASE("the table fits a terminal of a hundred columns and tells everything")
   CHECK(numbered(table, "ratio").find("0.3") != std::string::npos);  // 21 us to 64.5
 }
 
+// By hand: of 2000 ticks three fell into the run of 3300 us and ten are the start-up, so 1987 count.
+// 121.6 us a tick is 12.2 % of it; ten of 500 background steps of 80 us fit a tick, 90 of them into the start-up.
+TEST_CASE("the table line by line") {
+  std::string table = timing_table(report());
+  table.erase(0, table.find("us   "));
+  table.erase(table.find("  suggested: "));
+  CHECK(table == R"(us     count     min      p50      p99    p99.9   p99.99      max    mean  stddev
+ours                     1987    21.0     21.0     21.0     21.0     21.0     21.0    21.0    0.00
+cyclictest                200    53.5     64.5      270      406      406      406    72.5    39.4
+ratio                                     0.33     0.08     0.05     0.05     0.05
+(in turns; cyclictest's truncated microseconds n counted as n + 0.5, both in the same buckets)
+
+us                      count     min      p50      p99    p99.9   p99.99      max    mean  stddev
+wake-up latency          1987    21.0     21.0     21.0     21.0     21.0     21.0    21.0    0.00
+table                    1987     120      121      121      121     3300     3300     122    71.6
+  scanner <in> & "out"     1987     120      121      121      121     3300     3300     122    71.6
+  health                   19    0.00     0.00     0.00     0.00     0.00     0.00    0.00    0.00
+slack                    1987    0.00      859      859      859      859      859     859    19.3
+  surface                 410    80.0     80.0     80.0     80.0     80.0     80.0    80.0    0.00
+pushed by background       46    0.00     0.00     0.00     0.00     0.00     0.00    0.00    0.00
+frame to command    not measured
+data age            not measured
+(end to end is measured in runs with devices only)
+
+missed ticks        3 of 1997: woken late 0, preempted 0, computing 3
+      at, s  lost  cause         late, us    took, us  computed, us  longest task
+      0.703     3  computing         2321        3300          3300  scanner <in> & "out"
+latest wake-up      21.0 us late, at 0.010 s
+load                table 12.2 %, background 1.7 %, idle 86.2 %
+control thread      5 page faults, 3 times preempted, 1 moves to another processor, in 1990 ticks
+
+tasks                    runs   slips  late starts  lateness, us  overruns  longest at, s
+  scanner <in> & "out"     1987       3            0          0.00         1          0.700
+  health                   19       0            1          3021         0          0.100
+background               runs  forced      refused                overruns  longest at, s
+  surface                 410       0            0                       0          0.010
+
+budgets, us             p99.9       max  declared suggested   judged
+  scanner <in> & "out"      121      3300       200       190   fits
+  health                 0.00      0.00      20.0         -   too few runs
+  surface                80.0      80.0       100         -   too few runs
+  busiest tick 220 us declared, 210 us suggested, of 1000 us with 100 us guard
+)");
+}
+
 TEST_CASE("the end of a run shows wake-up, misses, load and the verdict, and no more") {
   const std::string lines = timing_lines(report());
   CHECK(count_of(lines, "\n") == 4);

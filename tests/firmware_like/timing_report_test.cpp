@@ -144,6 +144,7 @@ TEST_CASE("every task has its runs, slips, late starts and overruns") {
   CHECK(first["runs"] == 18);
   CHECK(first["slips"] == 2);
   CHECK(first["overruns"] == 1);
+  CHECK(first["longest_at_ms"] == 4.0);
   CHECK(first["budget_us"] == 250.0);
   CHECK(second["runs"] == 4);  // ticks 1, 9, 13 and 17
   CHECK(second["slips"] == 1);
@@ -201,6 +202,7 @@ TEST_CASE("declared budgets are judged by those suggested, and the suggested mus
   const Json budgets = light.run(2s)["budgets"];
   CHECK(budgets["tasks"][0]["judged"] == "generous");  // 30 us suggested of 250
   CHECK(budgets["tasks"][1]["judged"] == "too few runs");
+  CHECK(Bench{always(165us)}.run(2s)["budgets"]["tasks"][0]["judged"] == "fits");  // 250 us suggested of 250
   CHECK(budgets["tasks"][1]["suggested_us"].is_null());
   CHECK(budgets["background"][0]["p999_us"].is_null());
 
@@ -222,6 +224,33 @@ TEST_CASE("tools that read cyclictest's JSON find its names with its meaning") {
   CHECK(thread["max"] == 7);
   CHECK(thread["avg"].get<double>() == 7.9);
   CHECK(thread["histogram"] == Json({{"7", 100}}));
+}
+
+TEST_CASE("a microsecond of cyclictest's histogram holds all that lies in it") {
+  Bench bench{always(200us)};
+  for (const auto late : {7'100ns, 7'500ns, 7'900ns, 9'200ns}) {
+    bench.clock.oversleep = late;
+    bench.scheduler.run_tick();
+  }
+  const Json t = timing_report({.scheduler = bench.scheduler});
+  CHECK(t["thread"]["0"]["histogram"] == Json({{"7", 3}, {"9", 1}}));
+}
+
+TEST_CASE("background work that starves says how often it was refused and how often forced") {
+  Bench bench{always(850us), 1000};  // a step of 60 us and the guard of 100 us never fit
+  const Json t = bench.run(1s);
+  const Json& fit = t["background"][0];
+  CHECK(fit["forced"] == 10);  // every hundredth tick
+  CHECK(fit["refused"] == 990);
+  CHECK(fit["runs"] == 10);
+}
+
+TEST_CASE("the lateness of a task is what the budgets before it do not explain") {
+  Bench bench{always(400us)};  // 150 us beyond the first budget, 100 us guard
+  const Json t = bench.run(8ms);
+  CHECK(t["tasks"][1]["late_starts"] == 2);
+  CHECK(t["tasks"][1]["lateness_us"] == 100.0);
+  CHECK(t["tasks"][0]["lateness_us"] == 0.0);
 }
 
 TEST_CASE("the report of a run has every part") {
@@ -255,9 +284,10 @@ TEST_CASE("the report of a run has every part") {
     CHECK(t.contains(key));
   }
   CHECK(keys_of(t["tasks"][0]) == std::set<std::string>{"name", "period_ticks", "budget_us", "runs", "slips",
-                                                        "late_starts", "lateness_us", "overruns", "cost"});
-  CHECK(keys_of(t["background"][0]) ==
-        std::set<std::string>{"name", "quantum_us", "runs", "refused", "forced", "overruns", "cost"});
+                                                        "late_starts", "lateness_us", "overruns",
+                                                        "longest_at_ms", "cost"});
+  CHECK(keys_of(t["background"][0]) == std::set<std::string>{"name", "quantum_us", "runs", "refused",
+                                                             "forced", "overruns", "longest_at_ms", "cost"});
   CHECK(keys_of(t["budgets"]["tasks"][0]) ==
         std::set<std::string>{"name", "runs", "p999_us", "max_us", "declared_us", "suggested_us", "judged"});
 }
@@ -275,5 +305,11 @@ TEST_CASE("the conditions of a run head its report, with cyclictest's sysinfo an
   CHECK(t["sysinfo"]["realtime"] == 1);
   CHECK(t["thread"]["0"]["priority"] == 61);
   CHECK(t["thread"]["0"]["cpu"] == 2);
+  conditions.realtime.cpu = 0;
+  CHECK(timing_report({.scheduler = bench.scheduler, .conditions = &conditions})["thread"]["0"]["cpu"] == 0);
+  conditions.realtime.cpu = -1;  // any
+  CHECK_FALSE(
+      timing_report({.scheduler = bench.scheduler, .conditions = &conditions})["thread"]["0"].contains(
+          "cpu"));
   CHECK(t["environment"].is_object());
 }

@@ -395,3 +395,63 @@ TEST_CASE("the busiest tick is the one where offsets let rows meet") {
                                      {.name = "b", .period_ticks = 9967, .offset_ticks = 3, .budget = 7us}}};
   CHECK(busiest_tick(far) == 12us);
 }
+
+TEST_CASE("when the longest run began and the latest wake-up came is kept, of equals the first") {
+  ScriptedClock clock;
+  Scheduler scheduler{clock, every_millisecond()};
+  ScriptedTask before{clock, std::vector<Duration>(8, 10us)},
+      task{clock, {20us, 50us, 30us, 70us, 70us, 40us}};
+  ScriptedBackground work{clock, 2, 100us};
+  scheduler.add({.name = "before", .budget = 20us}, before);
+  scheduler.add({.name = "task", .budget = 100us}, task);
+  scheduler.add_background({.name = "work", .quantum = 200us}, work);
+  scheduler.start();
+  const Instant first = scheduler.next_tick();
+  scheduler.run_tick();
+  CHECK(scheduler.tasks()[1].longest_at == first + 10us);
+  CHECK(scheduler.background()[0].longest_at == first + 30us);
+  clock.oversleep = 7us;
+  scheduler.run_tick();
+  clock.oversleep = 0us;
+  work.pieces = 1, work.cost = 150us;
+  for (int i = 0; i < 4; ++i) scheduler.run_tick();
+  CHECK(scheduler.latest_wake_up() == first + 1007us);
+  CHECK(scheduler.tasks()[0].longest_at == first);  // all its runs took 10 us
+  CHECK(scheduler.tasks()[1].longest_at == first + 3010us);
+  CHECK(scheduler.background()[0].longest_at == first + 2040us);
+}
+
+TEST_CASE("start-up ticks count for no background work either") {
+  ScriptedClock clock;
+  auto settings = every_millisecond();
+  settings.warm_up_ticks = 2, settings.starvation_ticks = 1;
+  Scheduler scheduler{clock, settings};
+  ScriptedTask task{clock, std::vector<Duration>(6, 800us)};
+  ScriptedBackground work{clock, 100, 300us};  // never fits: 800 + 300 us
+  scheduler.add({.name = "task", .budget = 900us}, task);
+  scheduler.add_background({.name = "work", .quantum = 200us}, work);
+  scheduler.start();
+  const auto& record = scheduler.background()[0];
+  for (int i = 0; i < 3; ++i) scheduler.run_tick();
+  const auto steps = work.starts.size();
+  CHECK(steps > 0);
+  CHECK(record.runs + record.refused == 1);  // of the third tick alone
+  for (int i = 0; i < 3; ++i) scheduler.run_tick();
+  CHECK(record.runs == record.forced);
+  CHECK(record.runs + record.refused == 4);
+  CHECK(work.starts.size() > record.runs);
+  CHECK(record.cost.count() == record.runs);
+}
+
+TEST_CASE("start-up ticks are no candidates for the longest run") {
+  ScriptedClock clock;
+  auto settings = every_millisecond();
+  settings.warm_up_ticks = 2;
+  Scheduler scheduler{clock, settings};
+  ScriptedTask task{clock, {90us, 80us, 10us, 12us}};
+  scheduler.add({.name = "task", .budget = 100us}, task);
+  scheduler.start();
+  const Instant first = scheduler.next_tick();
+  for (int i = 0; i < 4; ++i) scheduler.run_tick();
+  CHECK(scheduler.tasks()[0].longest_at == first + 3ms);
+}
