@@ -55,6 +55,13 @@ std::expected<int, int> run_program(const std::vector<std::string>& words, const
 
 }  // namespace
 
+CyclictestResult& CyclictestResult::operator+=(const CyclictestResult& turn) {
+  latency.merge(turn.latency);
+  cycles += turn.cycles;
+  beyond += turn.beyond;
+  return *this;
+}
+
 std::vector<std::string> cyclictest_words(const CyclictestSettings& s, const fs::path& json) {
   std::vector<std::string> words = {"cyclictest",
                                     "--quiet",

@@ -31,6 +31,8 @@ struct CyclictestResult {
   tasks::Histogram latency;
   std::uint64_t cycles = 0;
   std::uint64_t beyond = 0;  // its histogram, which ends at cyclictest_histogram_us; counted as its max
+
+  CyclictestResult& operator+=(const CyclictestResult& turn);
 };
 
 inline constexpr int cyclictest_histogram_us = 100'000;

@@ -22,6 +22,11 @@ std::string throttling(const Environment& e) {
   return fmt::format("{} of {} us", *e.rt_runtime_us, *e.rt_period_us);
 }
 
+std::string lockable(const std::string& limit) {
+  const bool is_number = !limit.empty() && limit.front() >= '0' && limit.front() <= '9';
+  return is_number ? limit + " bytes" : or_word(limit, "unknown");
+}
+
 }  // namespace
 
 Json environment_json(const Environment& e) {
@@ -88,7 +93,7 @@ std::string conditions_text(const RunConditions& c) {
   const Environment& e = c.environment;
   std::string t;
   const auto row = [&](std::string_view name, const std::string& value) {
-    t += fmt::format("{:<16}{}\n", name, value);
+    t += fmt::format("{:<20}{}\n", name, value);
   };
   row("kernel", fmt::format("{} {}, {}", e.release, e.version,
                             e.realtime ? "PREEMPT_RT by " + e.realtime_found_by : "not PREEMPT_RT"));
@@ -101,12 +106,10 @@ std::string conditions_text(const RunConditions& c) {
                                       : "off",
                       or_word(e.governor, "none")));
   row("clock", fmt::format("{}; real-time throttling {}", or_word(e.clock_source, "unknown"), throttling(e)));
-  row("limits", fmt::format("memlock {}, rtprio {}", or_word(e.memlock_limit, "unknown"),
-                            or_word(e.rtprio_limit, "unknown")));
+  row("limits",
+      fmt::format("memlock {}, rtprio {}", lockable(e.memlock_limit), or_word(e.rtprio_limit, "unknown")));
   for (const auto& s : c.setup)
     row(to_string(s.item), s.ok ? s.got : fmt::format("{}, wanted {}: {}", s.got, s.wanted, s.hint));
-  const Verdict verdict = verdict_on(e, c.setup, c.realtime);
-  row("representative", verdict.representative ? "yes" : "NO: " + verdict.why());
   return t;
 }
 

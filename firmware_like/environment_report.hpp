@@ -23,6 +23,7 @@ Json counts_json(const ThreadCounts&);
 // The keys environment, setup, control_thread, representative and why; for virtual time (null) the last two alone.
 void put_conditions(Json& report, const RunConditions*);
 
+// What there is and what was had; the verdict is the last line of the figures (timing_table.hpp).
 std::string conditions_text(const RunConditions&);
 
 }  // namespace moldloft::firmware_like

@@ -130,23 +130,6 @@ bool had(const SetupRows& rows, SetupItem item) {
   return std::ranges::any_of(rows, [&](const SetupRow& row) { return row.item == item && row.ok; });
 }
 
-// As ours is: the same priority, interval, processor and memory lock, as far as ours got them.
-CyclictestSettings same_as(const RunConditions& conditions, const CellConfig& config, std::int64_t ticks) {
-  const auto& realtime = conditions.realtime;
-  return {.priority = had(conditions.setup, SetupItem::scheduling) ? realtime.priority : 0,
-          .cpu = had(conditions.setup, SetupItem::affinity) ? realtime.cpu : -1,
-          .lock_memory = realtime.lock_memory && had(conditions.setup, SetupItem::memory_lock),
-          .interval = config.tick,
-          .cycles = static_cast<std::uint64_t>(ticks)};
-}
-
-void add(std::optional<CyclictestResult>& all, const CyclictestResult& turn) {
-  if (!all) all.emplace();
-  all->latency.merge(turn.latency);
-  all->cycles += turn.cycles;
-  all->beyond += turn.beyond;
-}
-
 std::expected<Measured, RunError> measure(LatencyLoad& load, RunFolder& folder, const CellConfig& config,
                                           const TurnPlan& plan, bool compare) {
   Measured m{.conditions = {config.realtime, read_environment(config.realtime.cpu), {}}, .cyclictest = {}};
@@ -164,9 +147,10 @@ std::expected<Measured, RunError> measure(LatencyLoad& load, RunFolder& folder, 
       turns.take();
     }
     if (!compare || interrupted) continue;
-    const auto theirs = run_cyclictest(same_as(m.conditions, config, plan.ticks), folder.path);
+    const auto theirs = run_cyclictest(same_as(m.conditions, config.tick, plan.ticks), folder.path);
     if (!theirs) return std::unexpected{theirs.error()};
-    add(m.cyclictest, *theirs);
+    if (!m.cyclictest) m.cyclictest.emplace();
+    *m.cyclictest += *theirs;
   }
   m.conditions.control_thread = turns.counts();
   return m;
@@ -218,6 +202,15 @@ TurnPlan plan_turns(double duration_s, hal::Duration tick, bool compare) {
   return {.turns = turns, .ticks = std::max<std::int64_t>(1, std::llround(each_s / turns / tick_s))};
 }
 
+CyclictestSettings same_as(const RunConditions& conditions, hal::Duration tick, std::int64_t ticks) {
+  const auto& realtime = conditions.realtime;
+  return {.priority = had(conditions.setup, SetupItem::scheduling) ? realtime.priority : 0,
+          .cpu = had(conditions.setup, SetupItem::affinity) ? realtime.cpu : -1,
+          .lock_memory = realtime.lock_memory && had(conditions.setup, SetupItem::memory_lock),
+          .interval = tick,
+          .cycles = static_cast<std::uint64_t>(ticks)};
+}
+
 Json comparison_json(const tasks::Histogram& ours, const CyclictestResult& cyclictest) {
   const auto side = [](const tasks::Histogram& h, std::uint64_t cycles) {
     Json j = histogram_json(h);
@@ -228,7 +221,7 @@ Json comparison_json(const tasks::Histogram& ours, const CyclictestResult& cycli
   j["cyclictest"]["beyond_its_histogram"] = cyclictest.beyond;
   const auto ratio = [&](const char* key, const std::string& name) {
     const Json &a = j["ours"][key], &b = j["cyclictest"][key];
-    const bool known = a.is_number() && b.is_number() && b.get<double>() > 0;
+    const bool known = a.is_number() && b.is_number();  // cyclictest's least is half a microsecond
     j[name] = known ? Json(a.get<double>() / b.get<double>()) : Json(nullptr);
   };
   for (const auto& p : percentiles) {

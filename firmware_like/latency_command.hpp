@@ -30,6 +30,9 @@ struct TurnPlan {
 };
 TurnPlan plan_turns(double duration_s, hal::Duration tick, bool compare);
 
+// What makes cyclictest's turns like ours: priority, interval, processor and memory lock, as far as ours got them.
+CyclictestSettings same_as(const RunConditions&, hal::Duration tick, std::int64_t ticks);
+
 // Both wake-up latencies, their ratios, and how they were made comparable.
 Json comparison_json(const tasks::Histogram& ours, const CyclictestResult& cyclictest);
 

@@ -202,17 +202,20 @@ TEST_CASE("the JSON has the names of cyclictest where they mean the same, and th
 TEST_CASE("the text for a terminal says what was had, what not, and the verdict") {
   RunConditions conditions{{.cpu = 2}, environment_of(test::tuned_pc()), all_granted()};
   const std::string good = conditions_text(conditions);
-  CHECK(
-      good.find(
-          "kernel          6.1.0-26-rt-amd64 #1 SMP PREEMPT_RT Debian 6.1.112-1 (2024-09-30), PREEMPT_RT by "
-          "/sys/kernel/realtime and the kernel's version\n") != good.npos);
-  CHECK(good.find("                isolated 2-3, nohz_full 2-3, SMT off, governor performance\n") !=
+  CHECK(good.find("kernel              6.1.0-26-rt-amd64 #1 SMP PREEMPT_RT Debian 6.1.112-1 (2024-09-30), "
+                  "PREEMPT_RT by "
+                  "/sys/kernel/realtime and the kernel's version\n") != good.npos);
+  CHECK(good.find("                    isolated 2-3, nohz_full 2-3, SMT off, governor performance\n") !=
         good.npos);
   CHECK(good.find("real-time throttling off\n") != good.npos);
-  CHECK(good.ends_with("representative  yes\n"));
+  CHECK(good.find("limits              memlock unlimited, rtprio 60\n") != good.npos);
   conditions.setup[0] = {
       .item = SetupItem::scheduling, .wanted = "SCHED_FIFO 50", .got = "SCHED_OTHER", .hint = "ask for it"};
   const std::string bad = conditions_text(conditions);
-  CHECK(bad.find("scheduling      SCHED_OTHER, wanted SCHED_FIFO 50: ask for it\n") != bad.npos);
-  CHECK(bad.ends_with("representative  NO: the control thread has no FIFO priority\n"));
+  CHECK(bad.find("scheduling          SCHED_OTHER, wanted SCHED_FIFO 50: ask for it\n") != bad.npos);
+  conditions.environment.memlock_limit = "8388608";
+  conditions.setup.push_back({.item = SetupItem::ordinary_threads, .got = "2 of 2 threads", .ok = true});
+  const std::string limited = conditions_text(conditions);
+  CHECK(limited.find("memlock 8388608 bytes, ") != limited.npos);
+  CHECK(limited.find("ordinary threads    2 of 2 threads\n") != limited.npos);
 }

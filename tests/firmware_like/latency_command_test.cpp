@@ -36,6 +36,37 @@ TEST_CASE(
   check(1, 100ms, true, 1, 5);
 }
 
+TEST_CASE("cyclictest is given what ours got, not what ours asked for") {
+  RunConditions conditions{.realtime = {.priority = 61, .cpu = 3}, .environment = {}, .setup = {}};
+  const auto got = [&](SetupItem item, bool ok) {
+    conditions.setup.push_back({.item = item, .wanted = "", .got = "", .ok = ok});
+  };
+  for (const bool ok : {false, true}) {
+    CAPTURE(ok);
+    conditions.setup.clear();
+    for (const auto item : {SetupItem::memory_lock, SetupItem::affinity, SetupItem::scheduling})
+      got(item, ok);
+    const auto settings = same_as(conditions, 2ms, 2500);
+    CHECK(settings.priority == (ok ? 61 : 0));
+    CHECK(settings.cpu == (ok ? 3 : -1));
+    CHECK(settings.lock_memory == ok);
+    CHECK(settings.interval == 2ms);
+    CHECK(settings.cycles == 2500);
+  }
+  conditions.realtime.lock_memory = false;  // had, and not asked for: the limit would have allowed it
+  CHECK_FALSE(same_as(conditions, 1ms, 1).lock_memory);
+}
+
+TEST_CASE("turns of cyclictest add up") {
+  CyclictestResult all{.latency = hundred_of(20us, 50us), .cycles = 100, .beyond = 1};
+  all += {.latency = hundred_of(25us, 40us), .cycles = 101, .beyond = 2};
+  CHECK(all.latency.count() == 200);
+  CHECK(all.latency.max() == 50us);
+  CHECK(all.cycles == 201);
+  CHECK(all.beyond == 3);
+  CHECK(comparison_json(hundred_of(30us, 30us), all)["cyclictest"]["beyond_its_histogram"] == 3);
+}
+
 TEST_CASE("ratios are ours over cyclictest's, and unknown where there is nothing to divide by") {
   CyclictestResult theirs{.latency = hundred_of(20us, 50us), .cycles = 100, .beyond = 0};
   const Json c = comparison_json(hundred_of(30us, 200us), theirs);

@@ -271,6 +271,52 @@ budgets, us             p99.9       max  declared suggested   judged
 )");
 }
 
+TEST_CASE("the table says what is unusual, and only then") {
+  tasks::ScriptedClock clock;
+  tasks::ScriptedTask slow{clock, std::vector<hal::Duration>(3000, 700us)};
+  tasks::ScriptedBackground fit{clock, 2000, 150us};
+  tasks::Scheduler scheduler{clock, {.tick = 1ms, .warm_up_ticks = 0}};
+  scheduler.add({.name = "slow", .budget = 750us}, slow);
+  scheduler.add_background({.name = "surface", .quantum = 210us}, fit);
+  scheduler.start();
+  scheduler.run_until(1500ms);
+  clock.oversleep = 2500us;
+  scheduler.run_tick();
+  Json t = timing_report({.scheduler = scheduler});
+  const std::string table = timing_table(t);
+  CHECK(numbered(table, "  busiest tick").ends_with("guard: the suggested DO NOT FIT"));
+  const std::string miss = numbered(table, "      1.50");
+  CHECK(miss.find("woken late") != miss.npos);
+  CHECK(miss.find("none") == miss.npos);
+  CHECK(miss.back() == '0');  // no task is blamed: the line ends with the figures
+  // Every hundredth tick one step is forced; in the others it was refused.
+  CHECK(numbered(table, "  surface                  15      15         1486") != "");
+  CHECK(table.find("beyond 68 s") == table.npos);
+  CHECK(count_of(table, "(end to end is measured") == 1);
+
+  t["wake_up"]["overflows"] = 2;
+  t["frame_to_command"] = histogram_json(scheduler.wake_up());
+  const std::string other = timing_table(t);
+  CHECK(other.find("\n                    2 beyond 68 s\n") != other.npos);
+  CHECK(count_of(other, "(end to end is measured") == 0);
+}
+
+TEST_CASE("the last column of the ratios is that of the maxima") {
+  Json t = report();
+  t["compared"]["ratio_max"] = 77.7;
+  CHECK(numbered(timing_table(t), "ratio").ends_with("     77.7"));
+}
+
+TEST_CASE("figures have as many places as people read") {
+  CHECK(readable(0) == "0.00");
+  CHECK(readable(7.254) == "7.25");
+  CHECK(readable(72.54) == "72.5");
+  CHECK(readable(725.4) == "725");
+  CHECK(moment_s({{"t_ms", 1234.5678}}, "t_ms") == "1.235");
+  CHECK(moment_s({{"t_ms", nullptr}}, "t_ms") == "-");
+  CHECK(moment_s(Json::object(), "t_ms") == "-");  // a report of before it was kept
+}
+
 TEST_CASE("the end of a run shows wake-up, misses, load and the verdict, and no more") {
   const std::string lines = timing_lines(report());
   CHECK(count_of(lines, "\n") == 4);

@@ -141,11 +141,11 @@ TEST_CASE("a folder that holds a run is never overwritten, and resumed only with
   check_refused(
       run_program({MOLDLOFT, "run", config, "--out", run}),
       "moldloft: " + run + ": holds a run already; give another --out, or --resume to go on with it");
-  check_refused(
-      run_program({MOLDLOFT, "run", config, "--out", run, "--resume"}),
-      "moldloft: " + run +
-          ": was begun with another configuration ('robot.workspace.max_step_mm' differs); resume it with the same, or "
-          "begin a new run with another --out");
+  check_refused(run_program({MOLDLOFT, "run", config, "--out", run, "--resume"}),
+                "moldloft: " + run +
+                    ": was begun with another configuration ('robot.workspace.max_step_mm' differs); resume "
+                    "it with the same, or "
+                    "begin a new run with another --out");
   check_refused(run_program({MOLDLOFT, "fit", run, "--out", run}),
                 "moldloft: " + run + ": is the run itself; give another folder with --out");
   CHECK(fs::file_size(run + "/run.db") == size);
@@ -197,6 +197,7 @@ TEST_CASE("a latency self-test that cannot be is refused in one line before anyt
   refuses({"--duration", "nan"}, "--duration: nan s given; from 1 to 2592000 s");
   refuses({"--compare", "latencytest"}, "--compare: 'latencytest' given; it knows cyclictest");
   refuses({"--tick", "500"}, "--tick: 500 us given; from " + shortest + " to 100000 us");
+  refuses({"--tick", "100001"}, "--tick: 100001 us given; from " + shortest + " to 100000 us");
   refuses({"--tick", "-1"}, "--tick: -1 us given; from " + shortest + " to 100000 us");
   refuses({"--config", bench.path("none.toml")},
           bench.path("none.toml") + ": cannot be read; give the path of a cell configuration");

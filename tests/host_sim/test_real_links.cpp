@@ -289,3 +289,20 @@ TEST_CASE("the timing self-test runs on this machine and leaves its report") {
   REQUIRE_MESSAGE(store.has_value(), store.error().what);
   CHECK(store->shots()->size() == figures["busy"]["frames_recorded"].get<std::size_t>());
 }
+
+TEST_CASE("the timing self-test without a folder prints its table and leaves nothing behind") {
+  const hal::TemporaryFolder folder;
+  const auto done =
+      run_program({"/usr/bin/env", "TMPDIR=" + folder.file(""), MOLDLOFT, "latency", "--duration", "1"});
+  REQUIRE_MESSAGE(done.exit_code == 0, done.err);
+  CHECK(done.err == "measuring for 1 s; ctrl-C ends it with what there is\n");
+  CHECK(done.out.starts_with("kernel              "));
+  for (const char* row :
+       {"\nordinary threads    ", "\nwake-up latency ", "\nlatest wake-up      ", "\nrepresentative      "}) {
+    CAPTURE(row);
+    const auto at = done.out.find(row);
+    CHECK(at != std::string::npos);
+    CHECK(done.out.find(row, at + 1) == std::string::npos);
+  }
+  CHECK(std::filesystem::is_empty(folder.file("")));
+}
