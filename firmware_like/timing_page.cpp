@@ -232,10 +232,8 @@ std::string tasks_section(const Json& t) {
   return section(
       "Tasks",
       "A slip is a run that fell into a missed tick; a late start began after the budgets of the tasks "
-      "before it; an overrun took longer than its budget. Refused: a tick whose slack was too short. The "
-      "longest run "
-      "began at the time of the run given last: the events and the flight recorder's dumps tell what was "
-      "then.",
+      "before it; an overrun took longer than its budget. Refused: a tick whose slack was too short. Longest "
+      "at: when the longest run began, on the clock of the events and of the flight recorder.",
       table({{"task"},
              {"every n ticks"},
              {"runs"},
