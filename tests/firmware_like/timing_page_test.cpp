@@ -83,6 +83,23 @@ std::size_t count_of(const std::string& text, const std::string& what) {
   return n;
 }
 
+// The rows of the tables below a heading, "a | b | c" each; what is marked as bad has a "!" before it.
+std::string rows_below(const std::string& page, const std::string& heading) {
+  const auto begin = page.find("<h2>" + heading + "</h2>"), end = page.find("</section>", begin);
+  static const std::regex cell{R"re(<t[dh]( class="[^"]*")?>(.*?)</t[dh]>|</tr>)re"};
+  const std::string section = page.substr(begin, end - begin);
+  std::string rows, line;
+  for (std::sregex_iterator it{section.begin(), section.end(), cell}, last; it != last; ++it) {
+    if (it->str() == "</tr>") {
+      rows += std::exchange(line, "") + "\n";
+      continue;
+    }
+    const bool is_bad = (*it)[1].str().find("bad") != std::string::npos;
+    line += (line.empty() ? "" : " | ") + std::string{is_bad ? "!" : ""} + (*it)[2].str();
+  }
+  return rows;
+}
+
 std::string numbered(const std::string& text, const std::string& begin) {
   std::istringstream lines{text};
   for (std::string line; std::getline(lines, line);)
@@ -142,6 +159,45 @@ TEST_CASE("the page shows ours and cyclictest in one drawing, every task, miss a
   }
   CHECK(page.find("computing: 3") != page.npos);  // ticks 701 to 703
   CHECK(page.find(std::string{budget_rule}) != page.npos);
+}
+
+// The figures are those of the terminal's table, whose test says how they come about.
+TEST_CASE("the page's tables row by row") {
+  Json t = report();
+  const std::string page = timing_page(t, "run");
+  CHECK(rows_below(page, "How late a tick begins") ==
+        R"(us | count | min | p50 | p99 | p99.9 | p99.99 | max | mean | std. dev.
+ours | 1987 | 21.0 | 21.0 | 21.0 | 21.0 | 21.0 | 21.0 | 21.0 | 0.00
+cyclictest | 200 | 53.5 | 64.5 | 270 | 406 | 406 | 406 | 72.5 | 39.4
+ratio |  |  | 0.33 | 0.08 | 0.05 | 0.05 | 0.05 |  | 
+)");
+  CHECK(rows_below(page, "Missed ticks") ==
+        R"(at, s | lost | cause | late, us | tick took, us | on the processor, us | longest task
+0.703 | 3 | computing | 2321 | 3300 | 3300 | scanner &lt;in&gt; &amp; &quot;out&quot;
+)");
+  CHECK(rows_below(page, "Tasks") ==
+        R"(task | every n ticks | runs | slips | late starts | lateness, us | overruns | longest at, s
+scanner &lt;in&gt; &amp; &quot;out&quot; | 1 | 1987 | !3 | 0 | 0.00 | !1 | 0.700
+health | 100 | 19 | 0 | !1 | 3021 | 0 | 0.100
+background | steps | refused | forced | beyond the quantum | longest at, s
+surface | 410 | 0 | 0 | 0 | 0.010
+)");
+  CHECK(rows_below(page, "Budgets") ==
+        R"(us | runs | p99.9 | max | declared | suggested | judged
+scanner &lt;in&gt; &amp; &quot;out&quot; | 1987 | 121 | 3300 | 200 | 190 | fits
+health | 19 | 0.00 | 0.00 | 20.0 | - | too few runs
+surface | 410 | 80.0 | 80.0 | 100 | - | too few runs
+)");
+  CHECK(rows_below(page, "The control thread") ==
+        R"(ticks | page faults | gave way | preempted | moved
+1990 | 5 | 1990 | 3 | 1
+)");
+  CHECK(rows_below(page, "Process set-up") ==
+        R"(what | wanted | got | how to get it
+memory lock | all pages | !&lt;none&gt; | raise memlock
+)");
+  t["budgets"]["tasks"][0]["judged"] = "too small";
+  CHECK(rows_below(timing_page(t, "run"), "Budgets").find("| 190 | !too small\n") != std::string::npos);
 }
 
 TEST_CASE("a run in virtual time has a page without machine and comparison") {
