@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "hal/cable.hpp"
+#include "hal/driver_bench.hpp"
 #include "hal/robot_peer.hpp"
 
 using namespace moldloft::hal;
@@ -15,39 +15,10 @@ namespace {
 const Pose there{
     .x_mm = 412.35, .y_mm = -88.12, .z_mm = 155, .yaw = 0, .pitch = 180 * degree, .roll = 35 * degree};
 
-// One cell on a cable of 115200 baud, a tick of 1 ms.
-struct Cell {
-  VirtualClock clock;
-  Cable cable{clock, {.capacity_bytes = 4096, .bytes_per_second = 11520}};
-  RobotPeer peer{cable.device(), clock};
-  LineRobot robot{cable.host(), {}};
-  std::vector<RobotEvent> events;
-
-  void tick() {
-    robot.receive(clock.now());
-    while (const auto event = robot.next_event()) events.push_back(*event);
-    robot.transmit(clock.now());
-    peer.step();
-    clock.sleep_until(clock.now() + 1ms);
-  }
-  void run(Duration time) {
-    for (const Instant end = clock.now() + time; clock.now() < end;) tick();
-  }
-  bool run_until(Kind kind, Duration limit = 10s) {
-    const std::size_t seen = events.size();
-    for (const Instant end = clock.now() + limit; clock.now() < end;) {
-      tick();
-      if (events.size() > seen && events.back().kind == kind) return true;
-    }
-    return false;
-  }
-  void start() {
-    robot.start(clock.now());
-    REQUIRE(run_until(Kind::ready));
-  }
-  std::size_t count(Kind kind) const {
-    return static_cast<std::size_t>(std::ranges::count(events, kind, &RobotEvent::kind));
-  }
+// On a cable of 115200 baud.
+struct Cell : DriverBench<LineRobot, RobotPeer, RobotEvent> {
+  Cell() : DriverBench{{.capacity_bytes = 4096, .bytes_per_second = 11520}} {}
+  LineRobot& robot = driver;
 };
 
 }  // namespace

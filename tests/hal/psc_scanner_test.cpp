@@ -6,7 +6,7 @@
 #include <cstring>
 #include <random>
 
-#include "hal/cable.hpp"
+#include "hal/driver_bench.hpp"
 #include "hal/scanner_peer.hpp"
 
 using namespace moldloft::hal;
@@ -14,44 +14,14 @@ using Kind = ScannerEvent::Kind;
 
 namespace {
 
-struct Cell {
-  explicit Cell(PscScanner::Settings settings = {}, double bytes_per_second = 12.5e6)
-      : cable{clock, {.bytes_per_second = bytes_per_second}}, scanner{cable.host(), settings} {}
+struct Cell : DriverBench<PscScanner, ScannerPeer, ScannerEvent> {
+  explicit Cell(const PscScanner::Settings& settings = {}, double bytes_per_second = 12.5e6)
+      : DriverBench{{.bytes_per_second = bytes_per_second}, settings} {}
+  PscScanner& scanner = driver;
 
-  VirtualClock clock;
-  Cable cable;
-  ScannerPeer peer{cable.device(), clock};
-  PscScanner scanner;
-  std::vector<ScannerEvent> events;
-
-  void tick() {
-    scanner.receive(clock.now());
-    while (const auto event = scanner.next_event()) events.push_back(*event);
-    scanner.transmit(clock.now());
-    peer.step();
-    clock.sleep_until(clock.now() + 1ms);
-  }
-  void run(Duration time) {
-    for (const Instant end = clock.now() + time; clock.now() < end;) tick();
-  }
-  bool run_until(Kind kind, Duration limit = 10s) {
-    const std::size_t seen = events.size();
-    for (const Instant end = clock.now() + limit; clock.now() < end;) {
-      tick();
-      if (events.size() > seen && events.back().kind == kind) return true;
-    }
-    return false;
-  }
-  void start() {
-    scanner.start(clock.now());
-    REQUIRE(run_until(Kind::ready));
-  }
   const Frame& frame() {
     while (scanner.packed() > 0) scanner.unpack(64);
     return scanner.frame();
-  }
-  std::size_t count(Kind kind) const {
-    return static_cast<std::size_t>(std::ranges::count(events, kind, &ScannerEvent::kind));
   }
 };
 

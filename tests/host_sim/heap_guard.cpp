@@ -3,7 +3,6 @@
 #include <execinfo.h>
 #include <unistd.h>
 
-#include <cerrno>
 #include <cstdlib>
 
 namespace {
@@ -38,43 +37,6 @@ const bool moldloft::test::heap_guard_works = false;
 #else
 const bool moldloft::test::heap_guard_works = true;
 
-// glibc's own entry points stand behind these names. Every way to the heap ends at one of them: operator new in
-// libstdc++, Eigen's aligned memory, SQLite's, strdup().
-extern "C" {
-void* __libc_malloc(std::size_t);
-void* __libc_calloc(std::size_t, std::size_t);
-void* __libc_realloc(void*, std::size_t);
-void* __libc_memalign(std::size_t, std::size_t);
-void __libc_free(void*);
-
-void* malloc(std::size_t size) {
-  seen();
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t count, std::size_t size) {
-  seen();
-  return __libc_calloc(count, size);
-}
-void* realloc(void* old, std::size_t size) {
-  seen();
-  return __libc_realloc(old, size);
-}
-void* memalign(std::size_t alignment, std::size_t size) {
-  seen();
-  return __libc_memalign(alignment, size);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t size) {
-  seen();
-  return __libc_memalign(alignment, size);
-}
-int posix_memalign(void** memory, std::size_t alignment, std::size_t size) {
-  seen();
-  *memory = __libc_memalign(alignment, size);
-  return *memory == nullptr ? ENOMEM : 0;
-}
-void free(void* memory) {
-  if (memory != nullptr) seen();
-  __libc_free(memory);
-}
-}
+#define HEAP_CALLED(function) seen()
+#include "realtime/heap_entries.hpp"
 #endif

@@ -118,44 +118,8 @@ F* following(F*& kept, const char* name) noexcept {
   }
 #define GUARDED(result, name, parameters, arguments) GUARDED_IF(true, result, name, parameters, arguments)
 
-// glibc's own entry points stand behind these: dlsym() allocates, so its answer cannot be waited for here.
-extern "C" {
-void* __libc_malloc(std::size_t);
-void* __libc_calloc(std::size_t, std::size_t);
-void* __libc_realloc(void*, std::size_t);
-void* __libc_memalign(std::size_t, std::size_t);
-void __libc_free(void*);
-
-void* malloc(std::size_t size) {
-  count(index_of("malloc"));
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t n, std::size_t size) {
-  count(index_of("calloc"));
-  return __libc_calloc(n, size);
-}
-void* realloc(void* old, std::size_t size) {
-  count(index_of("realloc"));
-  return __libc_realloc(old, size);
-}
-void* memalign(std::size_t alignment, std::size_t size) {
-  count(index_of("memalign"));
-  return __libc_memalign(alignment, size);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t size) {
-  count(index_of("aligned_alloc"));
-  return __libc_memalign(alignment, size);
-}
-int posix_memalign(void** memory, std::size_t alignment, std::size_t size) {
-  count(index_of("posix_memalign"));
-  *memory = __libc_memalign(alignment, size);
-  return *memory == nullptr ? ENOMEM : 0;
-}
-void free(void* memory) {
-  if (memory != nullptr) count(index_of("free"));
-  __libc_free(memory);
-}
-}
+#define HEAP_CALLED(function) count(index_of(#function))
+#include "realtime/heap_entries.hpp"
 
 GUARDED(void*, mmap, (void* at, std::size_t n, int prot, int flags, int fd, off_t from),
         (at, n, prot, flags, fd, from))
