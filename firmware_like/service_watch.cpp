@@ -43,7 +43,7 @@ void ServiceWatch::look(const LoopSight& sight, hal::Instant now) {
   }
   if (sight.ticks != ticks_) {
     ticks_ = sight.ticks;
-    if (told_) tell_recovery(sight);
+    if (told_) tell_recovery(sight, now);
     standing_ = 0ns;
     if (!std::exchange(ready_, true)) {
       notify_.ready(sight.status);
@@ -73,7 +73,6 @@ void ServiceWatch::tell_culprit(const LoopSight& sight) {
                                        sight.task, seconds(standing_), ticks_);
   fmt::print(stderr, "moldloft: {}\n", line);
   notify_.status(line);
-  status_.clear();
   const Json report = {{"schema", 1},
                        {"task", std::string{sight.task}},
                        {"ticks", ticks_},
@@ -83,10 +82,12 @@ void ServiceWatch::tell_culprit(const LoopSight& sight) {
     fmt::print(stderr, "moldloft: {}\n", written.error().what);
 }
 
-void ServiceWatch::tell_recovery(const LoopSight& sight) {
+void ServiceWatch::tell_recovery(const LoopSight& sight, hal::Instant now) {
   told_ = false;
   fmt::print(stderr, "moldloft: the control loop goes on after {:.1f} s\n", seconds(standing_));
   notify_.status(sight.status);
+  status_ = sight.status;
+  last_status_ = now;
 }
 
 }  // namespace moldloft::firmware_like

@@ -42,7 +42,7 @@ class ServiceWatch {
  private:
   void say_status(const LoopSight&, hal::Instant now);
   void tell_culprit(const LoopSight&);
-  void tell_recovery(const LoopSight&);
+  void tell_recovery(const LoopSight&, hal::Instant now);
 
   ServiceNotify& notify_;
   std::filesystem::path report_;

@@ -68,8 +68,9 @@ void decode_block(const Columns<std::int16_t>& from, std::size_t first, const Fr
   const auto [offset_x, offset_y, offset_z] = head.offset;
   Points<count> points;
   for (std::size_t i = 0; i < count; ++i) {
-    const bool is_hole = (x[i] == missing) | (y[i] == missing) | (z[i] == missing);
-    const float hole = is_hole ? nan : 0.0f;
+    // Without a branch: the loop is to become vector instructions.
+    const int missing_axes = int{x[i] == missing} | int{y[i] == missing} | int{z[i] == missing};
+    const float hole = missing_axes != 0 ? nan : 0.0f;
     points.x[i] = hole + (offset_x + scale_x * static_cast<float>(x[i]));
     points.y[i] = hole + (offset_y + scale_y * static_cast<float>(y[i]));
     points.z[i] = hole + (offset_z + scale_z * static_cast<float>(z[i]));

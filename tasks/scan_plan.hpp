@@ -59,7 +59,7 @@ class ZigzagPlan {
              std::span<ShotPlace> places) MOLDLOFT_NONBLOCKING;
   bool step() MOLDLOFT_NONBLOCKING;  // true when the plan is done
   // How many of `places` are filled, in the order of travel.
-  std::expected<std::size_t, geometry::Error> result() const;
+  std::expected<std::size_t, geometry::Error> result() const MOLDLOFT_NONBLOCKING;
 
  private:
   enum class Stage : std::uint8_t { sample, turn, rows, too_many, done };

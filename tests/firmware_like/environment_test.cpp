@@ -214,7 +214,8 @@ TEST_CASE("the text for a terminal says what was had, what not, and the verdict"
   const std::string bad = conditions_text(conditions);
   CHECK(bad.find("scheduling          SCHED_OTHER, wanted SCHED_FIFO 50: ask for it\n") != bad.npos);
   conditions.environment.memlock_limit = "8388608";
-  conditions.setup.push_back({.item = SetupItem::ordinary_threads, .got = "2 of 2 threads", .ok = true});
+  conditions.setup.push_back(
+      {.item = SetupItem::ordinary_threads, .wanted = "", .got = "2 of 2 threads", .ok = true, .hint = ""});
   const std::string limited = conditions_text(conditions);
   CHECK(limited.find("memlock 8388608 bytes, ") != limited.npos);
   CHECK(limited.find("ordinary threads    2 of 2 threads\n") != limited.npos);

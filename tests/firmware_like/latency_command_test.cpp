@@ -39,7 +39,7 @@ TEST_CASE(
 TEST_CASE("cyclictest is given what ours got, not what ours asked for") {
   RunConditions conditions{.realtime = {.priority = 61, .cpu = 3}, .environment = {}, .setup = {}};
   const auto got = [&](SetupItem item, bool ok) {
-    conditions.setup.push_back({.item = item, .wanted = "", .got = "", .ok = ok});
+    conditions.setup.push_back({.item = item, .wanted = "", .got = "", .ok = ok, .hint = ""});
   };
   for (const bool ok : {false, true}) {
     CAPTURE(ok);

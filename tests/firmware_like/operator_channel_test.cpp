@@ -136,6 +136,7 @@ TEST_CASE("a path that is no address of a socket is refused before anything is b
   CHECK(OperatorSocket::open(std::string(108, 'x'))
             .error()
             .ends_with(": a path of 1 to 107 characters is wanted"));
+  CHECK(OperatorSocket::open("").error() == "--control : a path of 1 to 107 characters is wanted");
   CHECK(OperatorSocket::open("/nowhere/control").error() ==
         "--control /nowhere/control: No such file or directory");
 }
