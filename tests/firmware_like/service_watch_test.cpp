@@ -110,10 +110,15 @@ TEST_CASE("a loop that goes on after all is fed again") {
   bench.look_for(3s, 0);
   CHECK(bench.watch.stands());
   bench.others.clear();
-  CHECK(bench.look_for(3s, 100) == 30);
+  bench.sight.status = "Held";
+  CHECK(bench.look_for(100ms, 100) == 1);
   CHECK_FALSE(bench.watch.stands());
-  CHECK(bench.others ==
-        std::vector<std::string>{"STATUS=Execute"});  // in the place of the culprit's name, once
+  bench.sight.status = "Unholding";  // that waits its second
+  CHECK(bench.look_for(900ms, 100) == 9);
+  CHECK(bench.others == std::vector<std::string>{"STATUS=Held"});  // in place of the culprit's name, once
+  bench.sight.status = "Held";
+  bench.look_for(1s, 100);
+  CHECK(bench.others.size() == 1);  // nothing that it has not heard
 }
 
 TEST_CASE("the limit is half of the manager's when that is short") {
