@@ -403,8 +403,11 @@ TEST_CASE("when the longest run began and the latest wake-up came is kept, of eq
       task{clock, {20us, 50us, 30us, 70us, 70us, 40us}};
   ScriptedBackground work{clock, 2, 100us};
   scheduler.add({.name = "before", .budget = 20us}, before);
+  ScriptedTask nothing{clock, {}};
   scheduler.add({.name = "task", .budget = 100us}, task);
+  scheduler.add({.name = "nothing", .budget = 10us}, nothing);
   scheduler.add_background({.name = "work", .quantum = 200us}, work);
+  clock.stand_at(5ms);
   scheduler.start();
   const Instant first = scheduler.next_tick();
   scheduler.run_tick();
@@ -418,13 +421,14 @@ TEST_CASE("when the longest run began and the latest wake-up came is kept, of eq
   CHECK(scheduler.latest_wake_up() == first + 1007us);
   CHECK(scheduler.tasks()[0].longest_at == first);  // all its runs took 10 us
   CHECK(scheduler.tasks()[1].longest_at == first + 3010us);
+  CHECK(scheduler.tasks()[2].longest_at == first + 30us);  // it took no time at all, and that was the longest
   CHECK(scheduler.background()[0].longest_at == first + 2040us);
 }
 
 TEST_CASE("start-up ticks count for no background work either") {
   ScriptedClock clock;
   auto settings = every_millisecond();
-  settings.warm_up_ticks = 2, settings.starvation_ticks = 1;
+  settings.warm_up_ticks = 2, settings.starvation_ticks = 2;
   Scheduler scheduler{clock, settings};
   ScriptedTask task{clock, std::vector<Duration>(6, 800us)};
   ScriptedBackground work{clock, 100, 300us};  // never fits: 800 + 300 us
