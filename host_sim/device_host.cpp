@@ -6,11 +6,14 @@
 #include <cstdio>
 
 #include "firmware_like/results.hpp"
+#include "hal/cable.hpp"
 #include "hal/serial_link.hpp"
 #include "host_sim/cell_config.hpp"
+#include "host_sim/paced_link.hpp"
 #include "host_sim/pty_link.hpp"
 #include "host_sim/tcp_server_link.hpp"
 #include "host_sim/world.hpp"
+#include "host_sim/world_clock.hpp"
 
 namespace moldloft::host_sim {
 
@@ -76,24 +79,27 @@ class DeviceLog {
 int run_devices(const DeviceOptions& options) {
   const auto plate = placed_plate(options.cell);
   if (!plate) return failed(plate.error());
-  const auto scanner = TcpServerLink::listen_on(options.scanner_port);
+  auto scanner = TcpServerLink::listen_on(options.scanner_port);
   if (!scanner) return failed(scanner.error());
-  const auto robot = robot_line(options);
+  const std::uint16_t scanner_port = (*scanner)->port();
+  auto robot = robot_line(options);
   if (!robot) return failed(robot.error());
 
   if (!options.cell_toml.empty()) {
-    const CellAddresses here{.scanner_port = (*scanner)->port(), .robot_device = robot->controllers_device};
+    const CellAddresses here{.scanner_port = scanner_port, .robot_device = robot->controllers_device};
     const auto written = firmware_like::write_file(options.cell_toml, cell_toml(options.cell, *plate, here));
     if (!written) return failed({written.error().what});
   }
 
   catch_signals();
-  SimulatedWorld world(options.cell, *plate, **scanner, *robot->link);
-  fmt::print("ready: scanner 127.0.0.1:{} robot {} plate {} seed {}\n", (*scanner)->port(), robot->served_on,
+  hal::SteadyClock clock;
+  PacedLink scanner_wire{std::move(*scanner), clock, hal::Cable::Settings{}.bytes_per_second};
+  PacedLink robot_wire{std::move(robot->link), clock, serial_bytes_per_second};
+  SimulatedWorld world(options.cell, *plate, scanner_wire, robot_wire);
+  fmt::print("ready: scanner 127.0.0.1:{} robot {} plate {} seed {}\n", scanner_port, robot->served_on,
              plate->plate->name(), options.cell.seed);
   std::fflush(stdout);
 
-  hal::SteadyClock clock;
   const hal::Instant began = clock.now();
   hal::Instant next = began;
   DeviceLog log;
