@@ -3,8 +3,7 @@
 // backwards (thesis section 5.3.3, without its assumption that the plate lies along the axes).
 //
 // Frame        world, plan view, mm; the centre's height comes from the height model
-// Work         step() does one bounded piece: one side's samples, the box, one row; 30 us at most on a processor of 500
-//              million instructions a second
+// Work         step() does one bounded piece: one side's samples, the box, one row; 25,000 instructions at most
 // Allocation   none: shots go into the caller's array, from the corner of the box that is nearest to the arm on
 // Failure      geometry::Error::capacity when the plate needs more shots than the array holds
 #pragma once
@@ -75,8 +74,8 @@ class ZigzagPlan {
   ScanPlanSettings settings_;
   Eigen::Vector2d from_{0, 0};
   std::span<ShotPlace> places_;
-  std::array<Eigen::Vector2d, 4 * samples_per_side>
-      points_;  // of the outline; in the box's axes once it is known
+  // Of the outline; in the box's axes once it is known.
+  std::array<Eigen::Vector2d, 4 * samples_per_side> points_;
   Axes axes_;
   Spread rows_;
   double yaw_ = 0;
