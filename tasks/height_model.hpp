@@ -2,7 +2,7 @@
 // that fits best what has been seen so far. Good to a few millimetres, which is what the scanner's depth of
 // field asks for.
 //
-// Frame world, mm, coordinates taken relative to the first point. No allocation; add() 40 ns, solve() 6 x 6, at() 6 products.
+// Frame world, mm, coordinates taken relative to the first point. No allocation; add() 40 ns, solve() once 6 x 6.
 #pragma once
 
 #include "hal/realtime.hpp"
