@@ -20,9 +20,10 @@ inline constexpr std::array<tasks::TaskSpec, 6> task_table{{
     {.name = "health", .period_ticks = 100, .budget = 20us, .criticality = tasks::Criticality::ordinary},
 }};
 
-// A step is sized to keep the quantum on a processor of 500 million instructions a second. In virtual time it is
-// charged what a small controller of today takes for it.
-inline constexpr tasks::BackgroundSpec surface_work{.name = "surface", .quantum = 200us, .nominal = 12us};
+// The longest step, which seeks a corner on the whole boundary that a frame shows, takes 206 us on a processor of 500
+// million instructions a second (toolchain/cell-pc, whose gate holds all of them to the quantum). In virtual time a
+// step is charged what a small controller of today takes for it.
+inline constexpr tasks::BackgroundSpec surface_work{.name = "surface", .quantum = 240us, .nominal = 12us};
 
 // Four steps of a controller of today, a quarter of one on the slowest: what runs longer makes the next tick late, and
 // a late tick of up to 100 us is none that is missed.

@@ -327,8 +327,10 @@ std::size_t PlateRunFinder::reads_up_to(std::size_t at_most) const {
 
 std::expected<bool, Error> PlateRunFinder::cut_stripes(std::size_t at_most,
                                                        const PlateRunSettings& settings) {
-  if (walks_.empty() && next_stripe_ < stripes_.size())
+  if (walks_.empty() && next_stripe_ < stripes_.size()) {
     begin_walks(reads_up_to(at_most) - next_stripe_, settings);
+    return false;
+  }
   if (walking_) {
     walking_ = !StripeWalk::walk_in_turn(walks_, stripe_kernel(simd_), points_in_turn);
     return false;

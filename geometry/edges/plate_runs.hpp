@@ -74,9 +74,9 @@ class PlateRunFinder {
                                                        const Eigen::Vector3d& hint,
                                                        const PlateRunSettings& settings);
 
-  // The same in bounded pieces: begin(), cut_stripes() until it says true (it goes at most 192 points along at most
-  // eight stripes, 5 us, or makes runs of what it has found there), then find_plate() until it says true (0.2 us a
-  // run), plate_runs(). The stripes are the caller's and must stay until then.
+  // The same in bounded pieces: begin(), cut_stripes() until it says true (it looks how far apart the points of at
+  // most eight stripes lie, goes at most 192 points along them, 5 us, or makes runs of what it has found there), then
+  // find_plate() until it says true (0.2 us a run), plate_runs(). The stripes are the caller's and stay until then.
   std::expected<void, Error> begin(std::span<const StripeView> stripes) MOLDLOFT_GEOMETRY_NONBLOCKING;
   std::expected<bool, Error> cut_stripes(std::size_t at_most,
                                          const PlateRunSettings& settings) MOLDLOFT_GEOMETRY_NONBLOCKING;

@@ -24,6 +24,7 @@ GOOD = {
         "tick_us": 1000.0, "missed_ticks": 0, "missed_by_cause": {},
         "tasks": [{"name": "scanner in", "budget_us": 200.0, "overruns": 1, "cost": {"max_us": 296.0}},
                   {"name": "cell", "budget_us": 300.0, "overruns": 0, "cost": {"max_us": 300.0}}],
+        "background": [{"name": "surface", "quantum_us": 240.0, "overruns": 0, "cost": {"max_us": 240.0}}],
         "wake_up": {"p50_us": 7.7, "p99_us": 9.0, "p999_us": 12.3, "max_us": 34.4},
         "environment": {"sysinfo": {"realtime": 1}},
         "setup": [{"what": "scheduling", "wanted": "SCHED_FIFO 50", "got": "SCHED_FIFO 50", "ok": True}],
@@ -75,6 +76,10 @@ class Gate(unittest.TestCase):
     def test_a_decision_that_takes_longer_than_its_budget(self):
         def slow(files): files["run/timing.json"]["tasks"][1] |= {"overruns": 2, "cost": {"max_us": 347.2}}
         self.refuses(slow, "cell: 2 runs over its budget of 300 us, the longest 347")
+
+    def test_a_background_step_that_takes_longer_than_its_quantum(self):
+        def long(files): files["run/timing.json"]["background"][0] |= {"overruns": 1, "cost": {"max_us": 251.0}}
+        self.refuses(long, "surface: 1 steps over its quantum of 240 us, the longest 251")
 
     def test_wake_up_later_than_the_limits(self):
         def late(files): files["latency.json"]["ours"]["p999_us"] = 9.7

@@ -18,8 +18,8 @@ TICK_US = 1000.0
 # devices, whose bytes cross the cable when the emulator looks: it is held to no missed tick and to the maximum.
 SELF_TEST = "latency"
 
-# The row of the task table that makes no system call: what it takes is all ours. In the drivers' rows the kernel also does
-# the work of the link's far end, which is in the same machine here.
+# The row of the task table that makes no system call: what it takes is all ours, as the background's steps are. In the
+# drivers' rows the kernel also does the work of the link's far end, which is in the same machine here.
 COMPUTES = "cell"
 
 
@@ -80,6 +80,9 @@ def faults_of_the_budget(found):
     for row in found["timing"]["tasks"]:
         if row["name"] == COMPUTES and row["overruns"] != 0:
             yield f"{COMPUTES}: {row['overruns']} runs over its budget of {row['budget_us']:.0f} us, the longest {row['cost']['max_us']:.0f}"
+    for row in found["timing"]["background"]:
+        if row["overruns"] != 0:
+            yield f"{row['name']}: {row['overruns']} steps over its quantum of {row['quantum_us']:.0f} us, the longest {row['cost']['max_us']:.0f}"
 
 
 def faults_of_waking(found):
