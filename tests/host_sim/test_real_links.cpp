@@ -87,6 +87,8 @@ void check_report(const std::string& run) {
   CHECK(timing["frame_to_command"]["count"].get<int>() > 10);
   CHECK(timing["frame_to_command"]["p999_us"].is_number());
   CHECK(timing["data_age"]["p999_us"].get<double>() > timing["frame_to_command"]["p50_us"].get<double>());
+  REQUIRE(timing.contains("scanner_clock"));
+  CHECK(timing["scanner_clock"]["readings"].get<int>() > 10);
   CHECK(timing["budgets"]["tasks"].size() == 6);
   CHECK(timing["thread"]["0"]["cycles"] == timing["wake_up"]["count"]);
   const std::string page = text_of(run + "/report.html");
