@@ -5,7 +5,7 @@
 // Thread       as ByteLink says
 // Blocking     as ByteLink says
 // Allocation   none after open() of the link within
-// Failure      those of the link within
+// Failure      those of the link within; asserts on a wire that carries less than a byte a millisecond
 #pragma once
 
 #include <memory>

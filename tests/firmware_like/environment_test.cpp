@@ -199,7 +199,7 @@ TEST_CASE("the JSON has the names of cyclictest where they mean the same, and th
   CHECK(simulated == Json{{"representative", false}, {"why", "virtual time"}});
 }
 
-TEST_CASE("the text for a terminal says what was had, what not, and the verdict") {
+TEST_CASE("the text for a terminal says what there is, what was had, and what not") {
   RunConditions conditions{{.cpu = 2}, environment_of(test::tuned_pc()), all_granted()};
   const std::string good = conditions_text(conditions);
   CHECK(good.find("kernel              6.1.0-26-rt-amd64 #1 SMP PREEMPT_RT Debian 6.1.112-1 (2024-09-30), "

@@ -357,6 +357,15 @@ TEST_CASE("the table says what is unusual, and only then") {
   CHECK(count_of(other, "(end to end is measured") == 0);
 }
 
+TEST_CASE("the terminal's last words are the verdict, alone or with its reasons") {
+  Json t = report();
+  t["representative"] = true;
+  CHECK(timing_table(t).ends_with("\n\nrepresentative      yes\n"));
+  t["representative"] = false;
+  t["why"] = "the control thread has no FIFO priority";
+  CHECK(timing_table(t).ends_with("\n\nrepresentative      NO: the control thread has no FIFO priority\n"));
+}
+
 TEST_CASE("the last column of the ratios is that of the maxima") {
   Json t = report();
   t["compared"]["ratio_max"] = 77.7;
