@@ -11,10 +11,9 @@ import sys
 
 P999_TO_CYCLICTEST = 1.2  # the two wake in the same machine: ours may be later by the load of the cell, no more
 MAX_TO_CYCLICTEST = 3.0
-AGREEMENT = 0.05  # time counts instructions, and the host's load is no part of it
 TICK_US = 1000.0
 
-# Where cyclictest takes turns with ours and nothing else runs. The whole cell shares its processor with the simulated
+# Where cyclictest takes turns with ours and nothing else runs, before the cable is used. The whole cell shares its processor with the simulated
 # devices, whose bytes cross the cable when the emulator looks: it is held to no missed tick and to the maximum.
 SELF_TEST = "latency"
 
@@ -100,11 +99,14 @@ def faults_of_waking(found):
 
 
 def disagreements(first, second):
-    ours, theirs = first["waking"][SELF_TEST], second["waking"][SELF_TEST]
-    for key in ("p50_us", "p99_us", "p999_us"):
-        low, high = sorted((ours[key], theirs[key]))
-        if high > low * (1 + AGREEMENT):
-            yield f"{SELF_TEST}: wake-up {key} {ours[key]:.2f} and {theirs[key]:.2f}: they differ by more than {AGREEMENT:.0%}"
+    """Up to the whole cell nothing from outside reaches the machine: the two runs are one run, to the nanosecond.
+
+    One whose self-test differs is told although each keeps the limits: a figure that does not come back is no gate."""
+    for who in ("waking", "cyclictest"):
+        one, other = first[who][SELF_TEST], second[who][SELF_TEST]
+        for key in sorted(one.keys() | other.keys()):
+            if one.get(key) != other.get(key):
+                yield f"{SELF_TEST}, {'ours' if who == 'waking' else who}: {key} {one.get(key)} and {other.get(key)}: the machine is not reproducible"
 
 
 def table(runs):

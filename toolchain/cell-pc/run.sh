@@ -3,12 +3,13 @@
 # the machine is and what its figures are worth.
 #
 #     toolchain/cell-pc/run.sh [--build DIR] [--out DIR] [--jobs cyclictest,cell] [--cpu max] [--limit SECONDS]
-#                              [--kernel PACKAGE] [--realtime 'KEY = VALUE'] [-- DEVICES...]
+#                              [--seed N] [--kernel PACKAGE] [--realtime 'KEY = VALUE'] [-- DEVICES...]
 #
 # --build   the build tree with moldloft and moldloft-sim; default build/release
 # --out     where the results go; default build/cell-pc/results
-# --jobs    in this order: cyclictest, cell, latency; default all three. Or service, alone: the package's unit under systemd
+# --jobs    in this order; default cyclictest,latency,cell. Or service, alone: the package's unit under systemd
 # --cpu     QEMU's model of the processor
+# --seed    of the processor's random numbers, and with them of where the kernel puts things; default 1
 # --kernel  linux-image-rt-amd64 (default), or linux-image-amd64: what an ordinary one makes of it
 # --realtime  one line of [realtime] for the cell's configuration, such as 'priority = 0'
 # --limit   seconds of this machine's time after which the emulator is ended
@@ -18,7 +19,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-build=build/release out=build/cell-pc/results jobs= cpu=max,-erms,-fsrm limit=900 kernel_package=linux-image-rt-amd64 realtime=
+build=build/release out=build/cell-pc/results jobs= cpu=max,-erms,-fsrm limit=900 seed=1 kernel_package=linux-image-rt-amd64 realtime=
 while [ $# -gt 0 ]; do
   case $1 in
     --build) build=$2 ;;
@@ -26,6 +27,7 @@ while [ $# -gt 0 ]; do
     --jobs) jobs=$2 ;;
     --cpu) cpu=$2 ;;
     --limit) limit=$2 ;;
+    --seed) seed=$2 ;;
     --kernel) kernel_package=$2 ;;
     --realtime) realtime=$2 ;;
     --) shift; break ;;
@@ -115,15 +117,19 @@ make_root() {
   for library in $(find "$root/usr" "$scratch/unpacked/usr" -type f -perm -u+x -exec ldd {} + 2>/dev/null | grep -o '/[^ ]*\.so[^ ]*' | sort -u); do
     install -D -m 755 "$library" "$root$library"
   done
-  (cd "$root" && find . -print0 | cpio --null --create --format=newc --quiet --owner=0:0 | gzip -1) >"$scratch/initramfs"
+  # The same files make the same bytes: no order of the directory, no date and no inode of this machine is in them.
+  find "$root" -exec touch --no-dereference --date=@0 {} +
+  (cd "$root" && find . -print0 | sort -z | cpio --null --create --format=newc --reproducible --quiet --owner=0:0 | gzip -n -1) \
+    >"$scratch/initramfs"
 }
 
 # Time is the count of instructions: one takes 2 ns, and when the processor idles time jumps to what comes next, so the
-# figures do not depend on what else this machine does. COM1 is the console, COM2 the controller's port; the robot's server
+# figures do not depend on what else this machine does. The calendar follows that time too, and the processor's random
+# numbers are seeded: until bytes cross the cable, two runs of the same root are the same run. COM1 is the console, COM2 the controller's port; the robot's server
 # has a 16550 on the PCI bus, for COM3 and COM4 would have to share lines with them. The two are crossed by a socket.
 boot() {
   local pc=(
-    qemu-system-x86_64 -accel tcg -icount shift=1,sleep=off -cpu "$cpu" -m 512
+    qemu-system-x86_64 -accel tcg -icount shift=1,sleep=off -rtc base=2026-01-01,clock=vm -seed "$seed" -cpu "$cpu" -m 512
     -nodefaults -display none -no-reboot -net none
     -kernel "$kernel" -initrd "$scratch/initramfs" -append "console=ttyS0 quiet panic=1"
     -chardev "file,id=console,path=$scratch/console" -device isa-serial,index=0,chardev=console
