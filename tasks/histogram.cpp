@@ -7,7 +7,7 @@
 namespace moldloft::tasks {
 
 std::size_t Histogram::bucket_of(std::uint64_t ns) noexcept {
-  // Below 32 ns a bucket is one nanosecond; above, the five bits after the leading one say which part of its octave.
+  // Below 64 ns a bucket is one nanosecond; above, the six bits after the leading one say which part of its octave.
   if (ns < (1u << sub_bits)) return static_cast<std::size_t>(ns);
   const int octave = std::bit_width(ns) - 1 - sub_bits;
   return (static_cast<std::size_t>(octave + 1) << sub_bits) +
