@@ -19,25 +19,19 @@ struct Box {
   double area() const { return (max - min).prod(); }
 };
 
-Box box_along(const ZigzagPlan::Axes& axes, std::span<const Vector2d> points) {
+Eigen::Matrix2d into_axes(double yaw) {
+  const double c = std::cos(yaw), s = std::sin(yaw);
+  return Eigen::Matrix2d{{c, s}, {-s, c}};
+}
+
+Box box_along(const Eigen::Matrix2d& axes, std::span<const Vector2d> points) {
   Box box;
   for (const auto& p : points) {
-    const Vector2d q = axes.into(p);
+    const Vector2d q = axes * p;
     box.min = box.min.cwiseMin(q);
     box.max = box.max.cwiseMax(q);
   }
   return box;
-}
-
-// Fields that cover the length with the wanted overlap.
-ZigzagPlan::Spread spread(double from, double to, double field, const ScanPlanSettings& settings) {
-  const double length = to - from + 2 * settings.margin_mm;
-  ZigzagPlan::Spread s;
-  if (length > field)
-    s.count = 1 + static_cast<int>(std::ceil((length - field) / (field - settings.overlap_mm) - 1e-9));
-  s.step = s.count > 1 ? (length - field) / (s.count - 1) : 0;
-  s.first = s.count > 1 ? from - settings.margin_mm + field / 2 : (from + to) / 2;
-  return s;
 }
 
 }  // namespace
@@ -95,20 +89,22 @@ void ZigzagPlan::sample_side(std::size_t side) {
 // enough. From then on the samples are in the box's own axes.
 void ZigzagPlan::turn_to_plate() {
   Box box;
-  double least = INFINITY;
+  double least = INFINITY, yaw = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     const Vector2d chord = outline_->corners[(i + 1) % 4] - outline_->corners[i];
-    const Axes axes{std::atan2(chord.y(), chord.x())};
+    const double along = std::atan2(chord.y(), chord.x());
+    const Eigen::Matrix2d axes = into_axes(along);
     const Box tried = box_along(axes, points_);
     if (tried.area() >= least) continue;
     least = tried.area();
     box = tried;
-    axes_ = axes;
+    yaw = along;
+    box_from_world_ = axes;
   }
-  for (auto& p : points_) p = axes_.into(p);
-  yaw_ = axes_.yaw() + std::round((yaw_ - axes_.yaw()) / std::numbers::pi) * std::numbers::pi;
-  rows_ = spread(box.min.y(), box.max.y(), settings_.field_y_mm, settings_);
-  const Vector2d start = axes_.into(from_);
+  for (auto& p : points_) p = box_from_world_ * p;
+  yaw_ = yaw + std::round((yaw_ - yaw) / std::numbers::pi) * std::numbers::pi;
+  rows_ = spread(box.min.y(), box.max.y(), settings_.field_y_mm);
+  const Vector2d start = box_from_world_ * from_;
   from_top_ = start.y() > (box.min.y() + box.max.y()) / 2;
   forwards_ = start.x() < (box.min.x() + box.max.x()) / 2;
 }
@@ -118,15 +114,26 @@ bool ZigzagPlan::add_row() {
   const auto [low, high] = extent_between(y - settings_.field_y_mm / 2, y + settings_.field_y_mm / 2);
   const bool forwards = std::exchange(forwards_, !forwards_);
   if (low > high) return true;
-  const Spread columns = spread(low, high, settings_.field_x_mm, settings_);
+  const Spread columns = spread(low, high, settings_.field_x_mm);
   for (int column = 0; column < columns.count; ++column) {
     if (count_ == places_.size()) return false;
     const double x = columns.first + (forwards ? column : columns.count - 1 - column) * columns.step;
-    const Vector2d centre = axes_.out_of({x, y});
+    const Vector2d centre = box_from_world_.transpose() * Vector2d{x, y};
     places_[count_++] = {.centre = {centre.x(), centre.y(), heights_->at(centre.x(), centre.y())},
                          .head_yaw = yaw_};
   }
   return true;
+}
+
+// Fields that cover the length with the wanted overlap.
+ZigzagPlan::Spread ZigzagPlan::spread(double from, double to, double field) const {
+  const double length = to - from + 2 * settings_.margin_mm;
+  Spread s;
+  if (length > field)
+    s.count = 1 + static_cast<int>(std::ceil((length - field) / (field - settings_.overlap_mm) - 1e-9));
+  s.step = s.count > 1 ? (length - field) / (s.count - 1) : 0;
+  s.first = s.count > 1 ? from - settings_.margin_mm + field / 2 : (from + to) / 2;
+  return s;
 }
 
 // How far the outline reaches along the box's first axis between two heights of its second.

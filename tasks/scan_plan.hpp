@@ -9,7 +9,6 @@
 #pragma once
 
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <expected>
 #include <span>
@@ -31,26 +30,6 @@ struct ScanPlanSettings {
 
 class ZigzagPlan {
  public:
-  // World turned by a yaw: the axes of the box.
-  class Axes {
-   public:
-    explicit Axes(double yaw = 0) : yaw_{yaw}, c_{std::cos(yaw)}, s_{std::sin(yaw)} {}
-    double yaw() const { return yaw_; }
-    Eigen::Vector2d into(const Eigen::Vector2d& p) const {
-      return {c_ * p.x() + s_ * p.y(), -s_ * p.x() + c_ * p.y()};
-    }
-    Eigen::Vector2d out_of(const Eigen::Vector2d& p) const {
-      return {c_ * p.x() - s_ * p.y(), s_ * p.x() + c_ * p.y()};
-    }
-
-   private:
-    double yaw_, c_, s_;
-  };
-  struct Spread {  // of fields over a length: the first one's middle, and evenly on from there
-    int count = 1;
-    double first = 0, step = 0;
-  };
-
   // Of the two yaws that look the same the one nearer to `head_yaw_now` is taken. Outline, heights and `places` stay as
   // they are until the plan is done.
   void begin(const geometry::Outline&, const HeightModel& heights, const ScanPlanSettings&,
@@ -63,10 +42,15 @@ class ZigzagPlan {
  private:
   enum class Stage : std::uint8_t { sample, turn, rows, too_many, done };
   static constexpr std::size_t samples_per_side = 64;
+  struct Spread {  // of fields over a length: the first one's middle, and evenly on from there
+    int count = 1;
+    double first = 0, step = 0;
+  };
 
   void sample_side(std::size_t side) MOLDLOFT_NONBLOCKING;
   void turn_to_plate() MOLDLOFT_NONBLOCKING;
   bool add_row() MOLDLOFT_NONBLOCKING;
+  Spread spread(double from, double to, double field) const MOLDLOFT_NONBLOCKING;
   std::pair<double, double> extent_between(double low, double high) const MOLDLOFT_NONBLOCKING;
 
   const geometry::Outline* outline_ = nullptr;
@@ -76,7 +60,7 @@ class ZigzagPlan {
   std::span<ShotPlace> places_;
   // Of the outline; in the box's axes once it is known.
   std::array<Eigen::Vector2d, 4 * samples_per_side> points_;
-  Axes axes_;
+  Eigen::Matrix2d box_from_world_;
   Spread rows_;
   double yaw_ = 0;
   std::size_t side_ = 0, count_ = 0;
