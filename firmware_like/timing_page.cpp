@@ -24,8 +24,9 @@ main{max-width:960px;margin:0 auto;padding:24px 20px 48px}
 h1{font-size:24px;margin:0 0 4px}h2{font-size:17px;margin:34px 0 6px}p{margin:4px 0 10px}
 .soft{color:var(--soft)}.verdict{border-left:5px solid;padding:8px 14px;margin:14px 0;background:var(--panel)}
 .yes{border-color:var(--good)}.no{border-color:var(--bad)}
-.tiles{display:flex;flex-wrap:wrap;gap:10px;margin:16px 0}
-.tile{flex:1 1 130px;background:var(--panel);border:1px solid var(--line);border-radius:6px;padding:8px 12px}
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(130px,1fr));gap:10px;margin:16px 0}
+.tile{display:flex;flex-direction:column;justify-content:space-between;
+background:var(--panel);border:1px solid var(--line);border-radius:6px;padding:8px 12px}
 .tile b{display:block;font-size:21px;font-variant-numeric:tabular-nums;white-space:nowrap}
 .wide{overflow-x:auto}table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums;font-size:14px}
 th,td{padding:3px 8px;border-bottom:1px solid var(--line);text-align:right;white-space:nowrap}
