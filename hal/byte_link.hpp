@@ -29,7 +29,8 @@ class ByteLink {
   // Takes what fits into the send buffer; returns how many bytes were taken. The rest is the caller's to keep.
   virtual std::size_t write(std::span<const std::byte> in) noexcept MOLDLOFT_NONBLOCKING = 0;
 
-  // Looks at the link once more (a pending connect may have ended, a peer may have hung up) and says how it stands.
+  // Looks at the link once more (a pending connect may have ended, a peer may have hung up) and says how it stands. Two
+  // looks may get two answers: who decides by one asks once.
   virtual LinkState state() noexcept MOLDLOFT_NONBLOCKING = 0;
   virtual std::string_view why() const noexcept MOLDLOFT_NONBLOCKING = 0;
 };

@@ -220,12 +220,13 @@ void PscScanner::drop_shot(Instant) {
 
 void PscScanner::receive(Instant now) {
   if (phase_ == Phase::idle || phase_ == Phase::waiting) return;
-  if (link_.state() == LinkState::lost) {
+  const LinkState link = link_.state();
+  if (link == LinkState::lost) {
     lose(now, link_.why());
     return;
   }
   if (phase_ == Phase::opening) {
-    if (link_.state() == LinkState::open) cue(Cue::link_open, now);
+    if (link == LinkState::open) cue(Cue::link_open, now);
     return;
   }
   // The bytes of the last frame lie where the next message would go.

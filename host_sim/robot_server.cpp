@@ -23,13 +23,14 @@ RobotServer::RobotServer(hal::ByteLink& link, ArmDrive drive, const RobotTimes& 
     : link_(link), drive_(std::move(drive)), times_(times) {}
 
 void RobotServer::step(hal::Instant now) {
-  if (link_.state() == hal::LinkState::open) {
+  const hal::LinkState link = link_.state();
+  if (link == hal::LinkState::open) {
     connected_ = true;
     receive(now);
   } else {
     connected_ = false;
     line_used_ = out_used_ = 0;
-    if (link_.state() != hal::LinkState::opening) link_.open();
+    if (link != hal::LinkState::opening) link_.open();
   }
   watch(now);
   if (working_ && now >= busy_until_) finish_work(now);

@@ -56,10 +56,11 @@ void ScannerServer::forget_connection() {
 }
 
 void ScannerServer::step(hal::Instant now) {
-  const bool open = link_.state() == hal::LinkState::open;
+  const hal::LinkState link = link_.state();
+  const bool open = link == hal::LinkState::open;
   if (!open) {
     if (connected_) forget_connection();
-    if (link_.state() != hal::LinkState::opening) link_.open();
+    if (link != hal::LinkState::opening) link_.open();
   } else if (!connected_) {
     connected_ = true;
     ++counters_.connections;

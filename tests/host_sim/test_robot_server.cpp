@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "hal/cable.hpp"
+#include "host_sim/late_client.hpp"
 #include "host_sim/robot_server.hpp"
 #include "host_sim/scara_arm.hpp"
 
@@ -84,6 +85,17 @@ struct Bench {
 };
 
 }  // namespace
+
+TEST_CASE("whenever the robot's host comes, what it has sent is not thrown away") {
+  for (int looks = 0; looks < 6; ++looks) {
+    CAPTURE(looks);
+    LateClient link{looks};
+    RobotServer robot{link, ArmDrive(make_scara({}), {}, 1), {}};
+    for (int step = 0; step < 10; ++step) robot.step(step * 1ms);
+    CHECK(link.state() == hal::LinkState::open);
+    CHECK(link.openings() == 1);
+  }
+}
 
 TEST_CASE("numbered lines are refused before SYN, and motion before CAL") {
   Bench bench;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "hal/cable.hpp"
+#include "host_sim/late_client.hpp"
 #include "host_sim/plate_shape.hpp"
 #include "host_sim/scanner_server.hpp"
 
@@ -100,6 +101,20 @@ TEST_CASE("the scanner introduces itself and grants what it has") {
   CHECK(granted->stripes == 50);
   CHECK(granted->points_per_stripe == 250);
   CHECK(granted->status == psc1::Status::ok);
+}
+
+// It was: one start of the deployed program in some hundreds lost its first connection and waited 100 ms for the next.
+TEST_CASE("whenever the scanner's client comes, it is let in and stays") {
+  const StillScene scene;
+  for (int looks = 0; looks < 6; ++looks) {
+    CAPTURE(looks);
+    LateClient link{looks};
+    ScannerServer server{link, Optics({}), scene, {}, 1};
+    for (int step = 0; step < 10; ++step) server.step(step * 1ms);
+    CHECK(link.state() == hal::LinkState::open);
+    CHECK(link.openings() == 1);
+    CHECK(server.counters().connections == 1);
+  }
 }
 
 TEST_CASE("a shot is exposed at once and its frame follows after the processing time") {
