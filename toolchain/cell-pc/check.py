@@ -13,8 +13,9 @@ P999_TO_CYCLICTEST = 1.2  # the two wake in the same machine: ours may be later 
 MAX_TO_CYCLICTEST = 3.0
 TICK_US = 1000.0
 
-# Where cyclictest takes turns with ours and nothing else runs, before the cable is used. The whole cell shares its processor with the simulated
-# devices, whose bytes cross the cable when the emulator looks: it is held to no missed tick and to the maximum.
+# Where cyclictest takes turns with ours and nothing else runs, before the cable is used. The whole cell shares its
+# processor with the simulated devices, whose bytes cross the cable when the emulator looks: it is held to no missed tick
+# and to the maximum.
 SELF_TEST = "latency"
 
 # The row of the task table that makes no system call: what it takes is all ours, as the background's steps are. In the
@@ -102,11 +103,11 @@ def disagreements(first, second):
     """Up to the whole cell nothing from outside reaches the machine: the two runs are one run, to the nanosecond.
 
     One whose self-test differs is told although each keeps the limits: a figure that does not come back is no gate."""
-    for who in ("waking", "cyclictest"):
+    for who, name in (("waking", "ours"), ("cyclictest", "cyclictest")):
         one, other = first[who][SELF_TEST], second[who][SELF_TEST]
         for key in sorted(one.keys() | other.keys()):
             if one.get(key) != other.get(key):
-                yield f"{SELF_TEST}, {'ours' if who == 'waking' else who}: {key} {one.get(key)} and {other.get(key)}: the machine is not reproducible"
+                yield f"{SELF_TEST}, {name}: {key} {one.get(key)} and {other.get(key)}: the machine is not reproducible"
 
 
 def table(runs):

@@ -119,14 +119,15 @@ make_root() {
   done
   # The same files make the same bytes: no order of the directory, no date and no inode of this machine is in them.
   find "$root" -exec touch --no-dereference --date=@0 {} +
-  (cd "$root" && find . -print0 | sort -z | cpio --null --create --format=newc --reproducible --quiet --owner=0:0 | gzip -n -1) \
+  (cd "$root" && find . -print0 | LC_ALL=C sort -z | cpio --null --create --format=newc --reproducible --quiet --owner=0:0 | gzip -n -1) \
     >"$scratch/initramfs"
 }
 
 # Time is the count of instructions: one takes 2 ns, and when the processor idles time jumps to what comes next, so the
 # figures do not depend on what else this machine does. The calendar follows that time too, and the processor's random
-# numbers are seeded: until bytes cross the cable, two runs of the same root are the same run. COM1 is the console, COM2 the controller's port; the robot's server
-# has a 16550 on the PCI bus, for COM3 and COM4 would have to share lines with them. The two are crossed by a socket.
+# numbers are seeded: until bytes cross the cable, two runs of the same root are the same run. COM1 is the console, COM2
+# the controller's port; the robot's server has a 16550 on the PCI bus, for COM3 and COM4 would have to share lines with
+# them. The two are crossed by a socket.
 boot() {
   local pc=(
     qemu-system-x86_64 -accel tcg -icount shift=1,sleep=off -rtc base=2026-01-01,clock=vm -seed "$seed" -cpu "$cpu" -m 512
