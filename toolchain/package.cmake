@@ -10,7 +10,7 @@ set(documents ${CMAKE_INSTALL_DATAROOTDIR}/doc/moldloft)
 
 install(TARGETS moldloft RUNTIME DESTINATION bin COMPONENT controller)
 install(FILES ${package}/moldloft@.service DESTINATION lib/systemd/system COMPONENT controller)
-install(FILES ${package}/60-moldloft.rules DESTINATION lib/udev/rules.d COMPONENT controller)
+install(FILES ${package}/60-moldloft.rules ${package}/91-moldloft-braille.rules DESTINATION lib/udev/rules.d COMPONENT controller)
 install(FILES ${package}/sysusers.conf RENAME moldloft.conf DESTINATION lib/sysusers.d COMPONENT controller)
 # The file that explains every key is the configuration that is installed: there is no second one to grow old.
 install(FILES firmware_like/cell.example.toml RENAME cell.toml DESTINATION /etc/moldloft COMPONENT controller)

@@ -13,7 +13,8 @@ dpkg-deb -x "$package" "$root"
 
 installed=$(cd "$root" && find . -type f | LC_ALL=C sort | tr '\n' ' ')
 expected="./etc/moldloft/cell.toml ./usr/bin/moldloft ./usr/lib/systemd/system/moldloft@.service \
-./usr/lib/sysusers.d/moldloft.conf ./usr/lib/udev/rules.d/60-moldloft.rules ./usr/share/doc/moldloft/PROTOCOLS.md \
+./usr/lib/sysusers.d/moldloft.conf ./usr/lib/udev/rules.d/60-moldloft.rules \
+./usr/lib/udev/rules.d/91-moldloft-braille.rules ./usr/share/doc/moldloft/PROTOCOLS.md \
 ./usr/share/doc/moldloft/TUNING.md ./usr/share/doc/moldloft/changelog.gz ./usr/share/doc/moldloft/copyright \
 ./usr/share/man/man1/moldloft.1.gz "
 [ "$installed" = "$expected" ] || fail "holds $installed"
