@@ -28,6 +28,8 @@ int main(int argc, char** argv) {
       "begin the run in --out or go on with it, but come up held until `moldloft tell unhold`");
   run_command->add_option("--control", run.control,
                           "socket for `moldloft tell`; with it what waits for a person is waited for");
+  run_command->add_option("--go-on", run.go_on,
+                          "for what starts this program: the command to advise when the run can go on");
 
   TellOptions tell;
   auto* tell_command = app.add_subcommand("tell", "command a running cell, or ask for its status");

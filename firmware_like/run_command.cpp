@@ -95,8 +95,11 @@ std::string how_it_ended(const Controller& controller, const RunOptions& options
                        what, folder);
   }
   const bool too_small = cell.cause() == tasks::HoldCause::plan && cell.state() == tasks::CellState::held;
-  return fmt::format("{}. Everything so far is saved; to go on{}: moldloft run {} --out {} --resume", what,
-                     too_small ? " after that" : "", options.config_path, folder);
+  const std::string again =
+      options.go_on.empty() ? fmt::format("moldloft run {} --out {} --resume", options.config_path, folder)
+                            : options.go_on;
+  return fmt::format("{}. Everything so far is saved; to go on{}: {}", what, too_small ? " after that" : "",
+                     again);
 }
 
 // The same for a run that ended before the arm was sent anywhere: nothing was measured, nothing is kept.

@@ -28,6 +28,7 @@ struct RunOptions {
   // held, not connected to any device, until an operator says unhold over `control`.
   bool resume_held = false;
   std::string control;  // path of the operator's socket; empty: none
+  std::string go_on;    // the command that goes on with this run, where it is not this program's own
 };
 int run_cell(const RunOptions&);
 

@@ -13,7 +13,7 @@ trap end_devices EXIT
 start_devices() {
   local sim=$1
   shift
-  "$sim" devices --scanner-port 0 --robot-pty "$scratch/robot" --cell "$scratch/cell.toml" --seed 1 "$@" \
+  "$sim" devices --scanner-port 0 --robot-pty "$scratch/robot" --cell "$scratch/cell.toml" "$@" \
     >"$scratch/devices.log" 2>&1 &
   devices=$!
   for _ in $(seq 200); do

@@ -1,50 +1,89 @@
-# What `cpack` makes of a build tree: the Debian package of the controller.
+# What `cpack` makes of a build tree: the Debian packages.
 #
-#     cmake --preset release && cmake --build --preset release --target moldloft
-#     (cd build/release && cpack)                                  # leaves moldloft_VERSION_ARCHITECTURE.deb there
+#     toolchain/package.sh                    # sets up, builds, and leaves them in build/release/
+#     (cd build/release && cpack)             # the last step alone; before it: cmake --build --preset release --target packaged
 #
-# One component, `controller`; the geometry library is for other programs and stays out (install.cmake). Included at the
-# end of the top CMakeLists.txt.
+# | component  | package                 | what it is for                                                        |
+# | controller | moldloft                | the cell's computer                                                   |
+# | simulation | moldloft-sim            | rehearsing there: simulated devices for the installed controller      |
+# | geometry   | libmoldloft-geometry-dev | programs of others, install.cmake                                    |
+#
+# Included at the end of the top CMakeLists.txt.
 set(package ${PROJECT_SOURCE_DIR}/toolchain/package)
-set(documents ${CMAKE_INSTALL_DATAROOTDIR}/doc/moldloft)
+set(documents ${CMAKE_INSTALL_DATAROOTDIR}/doc)
+set(manuals ${CMAKE_INSTALL_DATAROOTDIR}/man/man1)
+
+# Everything that a package holds, and nothing else.
+add_custom_target(packaged DEPENDS moldloft moldloft-sim pty_modem moldloft_geometry)
 
 install(TARGETS moldloft RUNTIME DESTINATION bin COMPONENT controller)
 install(FILES ${package}/moldloft@.service DESTINATION lib/systemd/system COMPONENT controller)
 install(FILES ${package}/60-moldloft.rules ${package}/91-moldloft-braille.rules DESTINATION lib/udev/rules.d COMPONENT controller)
 install(FILES ${package}/sysusers.conf RENAME moldloft.conf DESTINATION lib/sysusers.d COMPONENT controller)
 # The file that explains every key is the configuration that is installed: there is no second one to grow old.
-install(FILES firmware_like/cell.example.toml RENAME cell.toml DESTINATION /etc/moldloft COMPONENT controller)
+# Under another prefix than the package's it stays below that prefix, so that cmake --install needs no root.
+install(CODE "
+  set(configuration \${CMAKE_INSTALL_PREFIX}/etc/moldloft)
+  if(CMAKE_INSTALL_PREFIX STREQUAL /usr)
+    set(configuration /etc/moldloft)
+  endif()
+  file(INSTALL \"${PROJECT_SOURCE_DIR}/firmware_like/cell.example.toml\" RENAME cell.toml DESTINATION \${configuration})"
+  COMPONENT controller)
+install(FILES hal/PROTOCOLS.md toolchain/TUNING.md DESTINATION ${documents}/moldloft COMPONENT controller)
+
+# The preloaded shim is the simulation's alone, in a folder where no other program looks for libraries.
+install(TARGETS moldloft-sim RUNTIME DESTINATION bin COMPONENT simulation)
+install(TARGETS pty_modem LIBRARY DESTINATION lib/moldloft COMPONENT simulation)
+install(PROGRAMS ${package}/moldloft-rehearse DESTINATION bin COMPONENT simulation)
 
 # gzip as the distribution's own pages are, without a date; made when CMake configures.
-function(install_compressed file name destination)
+file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/package)
+function(install_compressed file name destination component)
   execute_process(COMMAND gzip -9n -c ${file} OUTPUT_FILE ${PROJECT_BINARY_DIR}/package/${name} COMMAND_ERROR_IS_FATAL ANY)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
-  install(FILES ${PROJECT_BINARY_DIR}/package/${name} DESTINATION ${destination} COMPONENT controller)
+  install(FILES ${PROJECT_BINARY_DIR}/package/${name} DESTINATION ${destination} COMPONENT ${component})
 endfunction()
-file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/package)
-install_compressed(${package}/moldloft.1 moldloft.1.gz ${CMAKE_INSTALL_DATAROOTDIR}/man/man1)
-install_compressed(${package}/changelog changelog.gz ${documents})
+file(GLOB pages CONFIGURE_DEPENDS RELATIVE ${package} ${package}/*.1)
+foreach(page ${pages})
+  set(component controller)
+  if(page MATCHES "sim|rehearse")
+    set(component simulation)
+  endif()
+  install_compressed(${package}/${page} ${page}.gz ${manuals} ${component})
+endforeach()
 
-install(FILES ${package}/copyright hal/PROTOCOLS.md toolchain/TUNING.md DESTINATION ${documents} COMPONENT controller)
+set(packages_controller moldloft)
+set(packages_simulation moldloft-sim)
+set(packages_geometry libmoldloft-geometry-dev)
+foreach(component controller simulation geometry)
+  install_compressed(${package}/changelog changelog.gz ${documents}/${packages_${component}} ${component})
+  install(FILES ${package}/copyright DESTINATION ${documents}/${packages_${component}} COMPONENT ${component})
+endforeach()
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME moldloft)
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
-set(CPACK_PACKAGE_CONTACT "Moldloft developers <moldloft@localhost>")  # dpkg wants an address, and there is none to give
+set(CPACK_PACKAGE_CONTACT "Moldloft developers <moldloft@packages.invalid>")  # dpkg wants an address, and there is none to give
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
-set(CPACK_COMPONENTS_ALL controller)
+set(CPACK_COMPONENTS_ALL controller simulation geometry)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
   OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+# Refuses what would come out wrong without a word, and dates the packages by the changelog.
+set(CPACK_PROJECT_CONFIG_FILE ${package}/before_cpack.cmake)
+set(CPACK_MOLDLOFT_CHANGELOG ${package}/changelog)
 
 set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_DEBIAN_CONTROLLER_PACKAGE_NAME moldloft)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
-set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-# systemd-sysusers makes the user, udevadm is asked to read the rule; on a machine without systemd neither is missed.
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "systemd")
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "controller of a cell that measures formed ship plates")
+
+set(CPACK_DEBIAN_CONTROLLER_PACKAGE_NAME moldloft)
+set(CPACK_DEBIAN_CONTROLLER_PACKAGE_SECTION science)
+# systemd-sysusers makes the user, udevadm is asked to read the rule; on a machine without systemd neither is missed.
+set(CPACK_DEBIAN_CONTROLLER_PACKAGE_RECOMMENDS "systemd")
+set(CPACK_DEBIAN_CONTROLLER_PACKAGE_SUGGESTS "moldloft-sim")
 set(CPACK_COMPONENT_CONTROLLER_DESCRIPTION
 "A robot carries a laser-stripe scanner to a plate, finds its edge, walks
 round it and sweeps it; the result is the outline and the surface as one
@@ -55,5 +94,22 @@ that explains every key, a rule that names the serial port of the robot,
 and a guide to a quiet machine.")
 set(CPACK_DEBIAN_CONTROLLER_PACKAGE_CONTROL_EXTRA
   ${package}/postinst ${package}/prerm ${package}/postrm ${package}/conffiles)
-set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+
+set(CPACK_DEBIAN_SIMULATION_PACKAGE_NAME moldloft-sim)
+set(CPACK_DEBIAN_SIMULATION_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_SIMULATION_PACKAGE_DEPENDS "moldloft (= ${PROJECT_VERSION})")
+set(CPACK_COMPONENT_SIMULATION_DESCRIPTION
+"Simulated devices for a rehearsal on the computer of the cell: a scanner
+on loopback TCP and a robot on a pseudo-terminal, served in real time to
+the installed controller. moldloft-rehearse measures one simulated plate
+and says how far the result is from the truth.")
+
+set(CPACK_DEBIAN_GEOMETRY_PACKAGE_NAME libmoldloft-geometry-dev)
+set(CPACK_DEBIAN_GEOMETRY_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_GEOMETRY_PACKAGE_SHLIBDEPS OFF)  # headers and a static library: what it needs is needed when one compiles
+set(CPACK_DEBIAN_GEOMETRY_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4)")
+set(CPACK_COMPONENT_GEOMETRY_DESCRIPTION
+"Splines, edges of stripes, surface fits, inspection, STEP and IGES, for
+programs in C++23: a static library with headers that leans on Eigen alone,
+found with find_package(moldloft).")
 include(CPack)

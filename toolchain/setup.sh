@@ -8,6 +8,7 @@ packages=(
   g++ cmake ninja-build pkg-config git
   libeigen3-dev libasio-dev libserialport-dev libsqlite3-dev libfmt-dev libsystemd-dev
   libcli11-dev libtomlplusplus-dev nlohmann-json3-dev doctest-dev
+  file dpkg-dev  # cpack asks the one what a file is, the other which packages the program needs
 )
 wanted=()  # of the distribution's list of packages, without being installed
 if [ "${1-}" = --tests ]; then
@@ -16,12 +17,14 @@ if [ "${1-}" = --tests ]; then
   packages+=(libocct-data-exchange-dev)
   # Clang, whose checks prove that the control thread does not wait: 50 MiB to fetch, 280 MiB installed.
   packages+=(clang-22 libclang-rt-22-dev)
-  # The Debian package (its dependencies named by dpkg-dev, its unit checked by systemd), and the emulated cell PC, whose
-  # kernel is taken out of its package and which runs systemd and udev as they are here.
-  packages+=(dpkg-dev systemd udev python3 cpio busybox-static rt-tests qemu-system-x86)
+  # The Debian packages: their units checked by systemd, all of them by lintian, and the README's way to them walked in a clean
+  # Debian that debootstrap makes and systemd-nspawn boots.
+  packages+=(systemd lintian debootstrap systemd-container)
+  # The emulated cell PC, whose kernel is taken out of its package and which runs systemd and udev as they are here.
+  packages+=(udev python3 cpio busybox-static rt-tests qemu-system-x86)
   [ "$(dpkg --print-architecture)" = amd64 ] && wanted+=(linux-image-rt-amd64)
 fi
-[ "${1-}" = --aarch64 ] && packages+=(dpkg-dev g++-aarch64-linux-gnu qemu-user)
+[ "${1-}" = --aarch64 ] && packages+=(g++-aarch64-linux-gnu qemu-user)
 
 missing=()
 for package in "${packages[@]}"; do

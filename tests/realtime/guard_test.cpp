@@ -14,6 +14,13 @@ TEST_CASE("the guard counts every function that it knows when a section calls it
   for (const auto& [name, calls] : report["calls"].items()) CHECK_MESSAGE(calls.get<int>() >= 1, name);
 }
 
+TEST_CASE("what hardening calls by another name counts as what it is") {
+  const auto calls = report_of_probe("checked")["calls"];
+  for (const auto* each : {"read", "pread", "recv", "recvfrom", "poll", "ppoll", "fread", "open", "open64",
+                           "openat", "printf", "fprintf"})
+    CHECK_MESSAGE(calls[each] == 1, each);
+}
+
 TEST_CASE("what the control thread may do does not count") {
   const auto report = report_of_probe("allowed");
   CHECK(report["all"] == 0);

@@ -256,6 +256,58 @@ extern "C" int fprintf(FILE* file, const char* pattern, ...) {
   return printed;
 }
 
+// Hardened programs call some of these under the names of their checked variants, which know how large the
+// buffer is. They count as what they are.
+#define GUARDED_CHECKED(condition, counted, result, name, parameters, arguments) \
+  extern "C" result name parameters {                                            \
+    using Real = result parameters;                                              \
+    constinit static Real* kept = nullptr;                                       \
+    if (condition) count(index_of(#counted));                                    \
+    return following(kept, #name) arguments;                                     \
+  }
+GUARDED_CHECKED(waits(fd), read, ssize_t, __read_chk, (int fd, void* to, std::size_t n, std::size_t room),
+                (fd, to, n, room))
+GUARDED_CHECKED(waits(fd), pread, ssize_t, __pread_chk,
+                (int fd, void* to, std::size_t n, off_t at, std::size_t room), (fd, to, n, at, room))
+GUARDED_CHECKED(waits(fd), pread, ssize_t, __pread64_chk,
+                (int fd, void* to, std::size_t n, off_t at, std::size_t room), (fd, to, n, at, room))
+GUARDED_CHECKED(waits(fd, flags), recv, ssize_t, __recv_chk,
+                (int fd, void* to, std::size_t n, std::size_t room, int flags), (fd, to, n, room, flags))
+GUARDED_CHECKED(waits(fd, flags), recvfrom, ssize_t, __recvfrom_chk,
+                (int fd, void* to, std::size_t n, std::size_t room, int flags, sockaddr* from,
+                 socklen_t* size),
+                (fd, to, n, room, flags, from, size))
+GUARDED_CHECKED(timeout != 0, poll, int, __poll_chk, (pollfd * fds, nfds_t n, int timeout, std::size_t room),
+                (fds, n, timeout, room))
+GUARDED_CHECKED(!is_zero(timeout), ppoll, int, __ppoll_chk,
+                (pollfd * fds, nfds_t n, const timespec* timeout, const sigset_t* mask, std::size_t room),
+                (fds, n, timeout, mask, room))
+GUARDED_CHECKED(true, fread, std::size_t, __fread_chk,
+                (void* to, std::size_t room, std::size_t size, std::size_t n, FILE* file),
+                (to, room, size, n, file))
+GUARDED_CHECKED(true, open, int, __open_2, (const char* path, int flags), (path, flags))
+GUARDED_CHECKED(true, open64, int, __open64_2, (const char* path, int flags), (path, flags))
+GUARDED_CHECKED(true, openat, int, __openat_2, (int at, const char* path, int flags), (at, path, flags))
+GUARDED_CHECKED(true, openat, int, __openat64_2, (int at, const char* path, int flags), (at, path, flags))
+
+extern "C" int __printf_chk(int, const char* pattern, ...) {
+  count(index_of("printf"));
+  std::va_list more;
+  va_start(more, pattern);
+  const int printed = vprintf(pattern, more);
+  va_end(more);
+  return printed;
+}
+
+extern "C" int __fprintf_chk(FILE* file, int, const char* pattern, ...) {
+  count(index_of("fprintf"));
+  std::va_list more;
+  va_start(more, pattern);
+  const int printed = vfprintf(file, pattern, more);
+  va_end(more);
+  return printed;
+}
+
 // ---- breaking the rule, to see that the guard counts
 
 namespace {

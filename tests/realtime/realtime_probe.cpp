@@ -28,6 +28,23 @@
 #include "hal/realtime.hpp"
 #include "hal/realtime_section.hpp"
 
+// What a hardened program calls instead, when the compiler knows how large the buffer is.
+extern "C" {
+ssize_t __read_chk(int fd, void* to, std::size_t n, std::size_t room);
+ssize_t __pread_chk(int fd, void* to, std::size_t n, off_t at, std::size_t room);
+ssize_t __recv_chk(int fd, void* to, std::size_t n, std::size_t room, int flags);
+ssize_t __recvfrom_chk(int fd, void* to, std::size_t n, std::size_t room, int flags, sockaddr* from,
+                       socklen_t* size);
+int __poll_chk(pollfd* fds, nfds_t n, int timeout, std::size_t room);
+int __ppoll_chk(pollfd* fds, nfds_t n, const timespec* timeout, const sigset_t* mask, std::size_t room);
+std::size_t __fread_chk(void* to, std::size_t room, std::size_t size, std::size_t n, FILE* file);
+int __open_2(const char* path, int flags);
+int __open64_2(const char* path, int flags);
+int __openat_2(int at, const char* path, int flags);
+int __printf_chk(int flag, const char* pattern, ...);
+int __fprintf_chk(FILE* file, int flag, const char* pattern, ...);
+}
+
 namespace {
 
 using namespace moldloft::hal;
@@ -179,6 +196,26 @@ void use_files() {
   sink = dlopen(nullptr, RTLD_NOW);
 }
 
+// Each once, under the name that hardening gives it; each counts as what it is.
+void use_checked_names() {
+  const int zero = __open_2("/dev/zero", O_RDONLY);
+  close(__open64_2("/dev/zero", O_RDONLY));
+  close(__openat_2(AT_FDCWD, "/dev/zero", O_RDONLY));
+  char bytes[16] = {};
+  (void)!__read_chk(zero, bytes, 2, sizeof bytes);
+  (void)!__pread_chk(zero, bytes, 2, 0, sizeof bytes);
+  (void)!__recv_chk(zero, bytes, 2, sizeof bytes, 0);  // no socket: these two fail, and would have waited
+  (void)!__recvfrom_chk(zero, bytes, 2, sizeof bytes, 0, nullptr, nullptr);
+  pollfd look{.fd = zero, .events = POLLIN, .revents = 0};
+  const timespec moment{.tv_sec = 0, .tv_nsec = 1};
+  __poll_chk(&look, 1, 1, sizeof look);
+  __ppoll_chk(&look, 1, &moment, nullptr, sizeof look);
+  (void)!__fread_chk(bytes, sizeof bytes, 1, 1, stdin);
+  __printf_chk(1, "%s\n", "probe");
+  __fprintf_chk(stdout, 1, "%s\n", "probe");
+  close(zero);
+}
+
 void do_what_is_allowed() {
   int pair[2];
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair) != 0) std::abort();
@@ -206,6 +243,7 @@ void break_the_rule(std::string_view how) {
   if (how == "sleep") use_sleeps();
   if (how == "read") use_descriptors();
   if (how == "file") use_files();
+  if (how == "checked") use_checked_names();
 }
 
 void in_a_section(std::string_view how) noexcept MOLDLOFT_NONBLOCKING {

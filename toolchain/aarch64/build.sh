@@ -22,7 +22,7 @@ trap put_back EXIT
 put_back  # after a run that was killed: what is built and packaged are the programs
 
 cmake --preset aarch64 -D MOLDLOFT_TESTS=ON -D MOLDLOFT_GEOMETRY_ONLY=OFF >/dev/null
-cmake --build --preset aarch64 --target moldloft "${tests[@]}"
+cmake --build --preset aarch64 --target packaged "${tests[@]}"
 (cd build/aarch64 && DPKG_ADMINDIR=$PWD/../aarch64-sysroot/var/lib/dpkg cpack -B . | grep generated)
 depends=$(dpkg-deb -f build/aarch64/moldloft_*_arm64.deb Depends)
 [[ $depends == *libc6* ]] || { echo "aarch64: the package names no libraries that it needs: '$depends'" >&2; exit 1; }

@@ -98,7 +98,7 @@ add_systemd() {
 # The root of the PC: the package as dpkg unpacks it, and beside it what does not ship: the simulated devices.
 make_root() {
   local root=$scratch/root library program
-  cpack --config "$build/CPackConfig.cmake" -B "$scratch/package" >"$scratch/cpack.log" || { cat "$scratch/cpack.log" >&2; exit 1; }
+  cpack --config "$build/CPackConfig.cmake" -D CPACK_COMPONENTS_ALL=controller -B "$scratch/package" >"$scratch/cpack.log" || { cat "$scratch/cpack.log" >&2; exit 1; }
   mkdir -p "$root"/{dev,proc,sys,tmp,run,root,var} "$root"/usr/{bin,sbin,lib,lib64}
   for program in bin sbin lib lib64; do ln -s usr/$program "$root/$program"; done
   if [ "$jobs" = service ]; then  # the PC installs it itself, while systemd runs
