@@ -3,6 +3,8 @@
 #     find_package(moldloft 0.2 REQUIRED)
 #     target_link_libraries(... moldloft::geometry)        # and #include "geometry/fit/surface_fit.hpp"
 #
+# or by `pkg-config --cflags --libs moldloft-geometry`.
+#
 # It leans on Eigen and the standard library alone. Included at the end of the top CMakeLists.txt.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
@@ -26,3 +28,9 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/moldloft-config-version.c
   COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/moldloft-config.cmake ${PROJECT_BINARY_DIR}/moldloft-config-version.cmake
   DESTINATION ${moldloft_package_dir} COMPONENT geometry)
+
+# The same for whoever asks pkg-config. Its paths are relative to where it lies, so the tree may be moved.
+set(pkgconfig_dir ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+file(RELATIVE_PATH moldloft_prefix_from_pc /prefix/${pkgconfig_dir} /prefix)
+configure_file(toolchain/package/moldloft-geometry.pc.in ${PROJECT_BINARY_DIR}/moldloft-geometry.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/moldloft-geometry.pc DESTINATION ${pkgconfig_dir} COMPONENT geometry)

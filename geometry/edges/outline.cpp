@@ -73,8 +73,8 @@ struct OutlineBuilder::SidePass {
   std::size_t next = 0;  // of the side's points
   int trial = 0;
   double stiffness = 0, unit = 0, least = 0;
-  SideMatrix roughness;
-  SideVector best;
+  SideMatrix roughness = {};
+  SideVector best = {};
 };
 
 OutlineBuilder::OutlineBuilder(std::size_t max_points, const OutlineSettings& settings)

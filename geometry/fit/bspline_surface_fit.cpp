@@ -119,14 +119,14 @@ std::expected<BSplineSurfaceFit, MatchingFailure> BSplineSurfaceFit::assemble(
 }
 
 void BSplineSurfaceFit::add_pieces(std::span<const StripeTrack> stripes, PieceWeight weight) {
-  std::vector<StripePiece> cuts;
+  std::vector<TrackPiece> cuts;
   CellGram cell(system_);
   for (std::size_t s = 0; s < stripes.size(); ++s) {
     const StripeTrack& stripe = stripes[s];
     stripe_knots_.push_back(stripe.knots);
     cuts.clear();
     cut_stripe(stripe.preimage, stripe.knots, knots_u_, knots_v_, cuts);
-    for (const StripePiece& cut : cuts) {
+    for (const TrackPiece& cut : cuts) {
       Piece& piece = pieces_.emplace_back();
       piece.root_weight = weight == PieceWeight::length ? std::sqrt(cut.length()) : 1.0;
       piece.along_u = piece.root_weight * span_restriction(knots_u_, cut.span_u, cut.uv0.x(), cut.uv1.x());

@@ -69,7 +69,7 @@ std::expected<void, Error> check_preimage(const Preimage& preimage, std::span<co
 
 void cut_stripe(const Preimage& preimage, std::span<const double> stripe_knots,
                 std::span<const double> knots_u, std::span<const double> knots_v,
-                std::vector<StripePiece>& pieces) {
+                std::vector<TrackPiece>& pieces) {
   std::vector<double> cuts;
   for (std::size_t i = 1; i < preimage.t.size(); ++i) {
     const double t0 = preimage.t[i - 1], t1 = preimage.t[i];

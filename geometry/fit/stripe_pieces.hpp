@@ -28,7 +28,7 @@ struct Preimage {
 
 Preimage straight_preimage(const Eigen::Vector2d& from, const Eigen::Vector2d& to);  // t from 0 to 1
 
-struct StripePiece {
+struct TrackPiece {
   int stripe_span, span_u, span_v;  // find_span() of the stripe's and the surface's knots
   double t0, t1;
   Eigen::Vector2d uv0, uv1;  // the pre-image at t0 and t1, straight between them
@@ -42,6 +42,6 @@ std::expected<void, Error> check_preimage(const Preimage&, std::span<const doubl
 
 // Appends the pieces in the order of t. Expects arguments that have passed the checks above.
 void cut_stripe(const Preimage&, std::span<const double> stripe_knots, std::span<const double> knots_u,
-                std::span<const double> knots_v, std::vector<StripePiece>& pieces);
+                std::span<const double> knots_v, std::vector<TrackPiece>& pieces);
 
 }  // namespace moldloft::geometry

@@ -76,7 +76,7 @@ BezierSurface elevate(const BezierSurface& surface, int degree_u, int degree_v) 
   return {along_u * surface.x * along_v, along_u * surface.y * along_v, along_u * surface.z * along_v};
 }
 
-BezierSurface restrict_to(const BezierSurface& surface, const Box& box) {
+BezierSurface restrict_to(const BezierSurface& surface, const ParameterBox& box) {
   const Eigen::MatrixXd along_u = restrict_bernstein(surface.degree_u(), box.begin_u, box.end_u).transpose();
   const Eigen::MatrixXd along_v = restrict_bernstein(surface.degree_v(), box.begin_v, box.end_v);
   return {along_u * surface.x * along_v, along_u * surface.y * along_v, along_u * surface.z * along_v};

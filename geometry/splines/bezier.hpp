@@ -48,10 +48,10 @@ BezierSurface elevate(const BezierSurface& surface, int degree_u, int degree_v);
 
 // The surface on a box of its domain, over [0, 1]^2 again; a side of the box may run backwards. Subdivision
 // is this with boxes that share a side.
-struct Box {
+struct ParameterBox {
   double begin_u, end_u, begin_v, end_v;
 };
-BezierSurface restrict_to(const BezierSurface& surface, const Box& box);
+BezierSurface restrict_to(const BezierSurface& surface, const ParameterBox& box);
 
 // The polynomial pieces of a B-spline curve, one for every span that is not empty, in order.
 template <int dim>
@@ -64,7 +64,7 @@ std::vector<BezierPiece<dim>> bezier_pieces(const BSplineCurve<dim>& curve);
 
 // The patches of a B-spline surface; u runs fastest.
 struct BezierPatch {
-  Box box;
+  ParameterBox box;
   BezierSurface surface;
 };
 std::vector<BezierPatch> bezier_patches(const BSplineSurface& surface);

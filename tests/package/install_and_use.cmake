@@ -1,11 +1,63 @@
-# Installs the geometry library into a scratch root, builds the program beside this file against it, and runs it.
-# Called by ctest with -D BUILD=, SOURCE=, SCRATCH=, GENERATOR=, COMPILER=.
+# Installs the geometry library into a scratch root, builds the programs beside this file against it, and runs them: once as
+# a CMake package, once by what pkg-config says, with the warnings of a careful user as errors.
+# Called by ctest with -D BUILD=, SOURCE=, SCRATCH=, GENERATOR=, COMPILER=, PKG_CONFIG= (empty: that half is left out).
 file(REMOVE_RECURSE ${SCRATCH})
-foreach(command IN ITEMS
-    "${CMAKE_COMMAND};--install;${BUILD};--component;geometry;--prefix;${SCRATCH}/root"
-    "${CMAKE_COMMAND};-S;${SOURCE};-B;${SCRATCH}/build;-G;${GENERATOR};-DCMAKE_CXX_COMPILER=${COMPILER};-DCMAKE_PREFIX_PATH=${SCRATCH}/root"
-    "${CMAKE_COMMAND};--build;${SCRATCH}/build"
-    "${SCRATCH}/build/flat_plate")
-  execute_process(COMMAND ${command} COMMAND_ECHO STDOUT COMMAND_ERROR_IS_FATAL ANY)
+function(run)
+  execute_process(COMMAND ${ARGN} COMMAND_ECHO STDOUT COMMAND_ERROR_IS_FATAL ANY)
+endfunction()
+
+run(${CMAKE_COMMAND} --install ${BUILD} --component geometry --prefix ${SCRATCH}/root)
+run(${CMAKE_COMMAND} -S ${SOURCE} -B ${SCRATCH}/build -G ${GENERATOR} -D CMAKE_CXX_COMPILER=${COMPILER}
+  -D CMAKE_PREFIX_PATH=${SCRATCH}/root)
+run(${CMAKE_COMMAND} --build ${SCRATCH}/build)
+run(${SCRATCH}/build/flat_plate)
+
+# A saddle of 20 x 20 points: a bicubic, so the surface goes through every one of them.
+set(points "")
+foreach(i RANGE 19)
+  foreach(j RANGE 19)
+    math(EXPR x "10 * ${i}")
+    math(EXPR y "15 * ${j}")
+    math(EXPR z "${i} * ${j}")
+    string(APPEND points "${x} ${y} ${z}\n")
+  endforeach()
 endforeach()
+file(WRITE ${SCRATCH}/saddle.xyz ${points})
+
+# `program` must make a STEP file of the saddle, and of a line of points a sentence instead.
+function(check_points_to_step program)
+  execute_process(COMMAND ${program} ${SCRATCH}/saddle.xyz ${SCRATCH}/saddle.step OUTPUT_VARIABLE said COMMAND_ERROR_IS_FATAL ANY)
+  if(NOT said MATCHES "^400 points, 7 x 7 control points, rms (0|[0-9.]+e-1[0-9]) mm")
+    message(FATAL_ERROR "${program} says of a saddle: ${said}")
+  endif()
+  file(STRINGS ${SCRATCH}/saddle.step surfaces REGEX "B_SPLINE_SURFACE_WITH_KNOTS")
+  if(surfaces STREQUAL "")
+    message(FATAL_ERROR "${program} leaves no surface in the STEP file")
+  endif()
+  file(WRITE ${SCRATCH}/line.xyz "0 0 0\n10 0 1\n20 0 2\n")
+  execute_process(COMMAND ${program} ${SCRATCH}/line.xyz ${SCRATCH}/line.step RESULT_VARIABLE code ERROR_VARIABLE said)
+  if(NOT code EQUAL 1 OR NOT said MATCHES "no surface: the points or their domain have no extent in one direction")
+    message(FATAL_ERROR "${program} ends a line of points with ${code} and says: ${said}")
+  endif()
+endfunction()
+check_points_to_step(${SCRATCH}/build/points_to_step)
+
+if(PKG_CONFIG)
+  set(ENV{PKG_CONFIG_PATH} ${SCRATCH}/root/lib/pkgconfig)
+  file(GLOB multiarch ${SCRATCH}/root/lib/*/pkgconfig)
+  if(multiarch)
+    set(ENV{PKG_CONFIG_PATH} ${multiarch})
+  endif()
+  execute_process(COMMAND ${PKG_CONFIG} --cflags --libs moldloft-geometry OUTPUT_VARIABLE flags COMMAND_ERROR_IS_FATAL ANY)
+  separate_arguments(flags UNIX_COMMAND "${flags}")
+  # Every header that is installed, in one program: none needs another first, and no two say different things by one name.
+  file(GLOB_RECURSE headers RELATIVE ${SCRATCH}/root/include/moldloft ${SCRATCH}/root/include/moldloft/*.hpp)
+  list(TRANSFORM headers REPLACE "(.+)" "#include \"\\1\"")
+  list(JOIN headers "\n" all)
+  file(WRITE ${SCRATCH}/all_headers.cpp "${all}\n")
+  set(careful -std=c++23 -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Werror)
+  run(${COMPILER} ${careful} -c ${SCRATCH}/all_headers.cpp -o ${SCRATCH}/all_headers.o ${flags})
+  run(${COMPILER} ${careful} ${SOURCE}/points_to_step.cpp ${SCRATCH}/all_headers.o -o ${SCRATCH}/points_to_step ${flags})
+  check_points_to_step(${SCRATCH}/points_to_step)
+endif()
 file(REMOVE_RECURSE ${SCRATCH})

@@ -104,9 +104,9 @@ Equations dense_equations(const std::vector<double>& u, const std::vector<double
   std::vector<Eigen::VectorXd> rows;
   std::vector<Vector3d> data;
   for (std::size_t s = 0; s < stripes.tracks.size(); ++s) {
-    std::vector<StripePiece> pieces;
+    std::vector<TrackPiece> pieces;
     cut_stripe(stripes.tracks[s].preimage, stripes.tracks[s].knots, u, v, pieces);
-    for (const StripePiece& piece : pieces) {
+    for (const TrackPiece& piece : pieces) {
       MatrixXd samples = MatrixXd::Zero(7, nu * nv), points = MatrixXd::Zero(7, 3);
       for (int n = 0; n < 7; ++n) {
         const double share = n / 6.0, t = (1 - share) * piece.t0 + share * piece.t1;

@@ -13,10 +13,10 @@ using Eigen::Vector2d;
 
 namespace {
 
-std::vector<StripePiece> cut(const Preimage& preimage, const std::vector<double>& stripe,
-                             const std::vector<double>& u, const std::vector<double>& v) {
+std::vector<TrackPiece> cut(const Preimage& preimage, const std::vector<double>& stripe,
+                            const std::vector<double>& u, const std::vector<double>& v) {
   REQUIRE(check_preimage(preimage, stripe, u, v).has_value());
-  std::vector<StripePiece> pieces;
+  std::vector<TrackPiece> pieces;
   cut_stripe(preimage, stripe, u, v, pieces);
   return pieces;
 }
@@ -80,7 +80,7 @@ TEST_CASE("pieces follow one another without a gap and each lies in its own cell
       preimage.uv.emplace_back(unit(random), unit(random));
     }
     double t = 0, length = 0, whole = 0;
-    for (const StripePiece& piece : cut(preimage, stripe, u, v)) {
+    for (const TrackPiece& piece : cut(preimage, stripe, u, v)) {
       CHECK(piece.t0 == t);
       CHECK(piece.t1 > piece.t0);
       for (const double share : {1e-3, 0.5, 1 - 1e-3}) {

@@ -105,7 +105,7 @@ TEST_CASE("raised and restricted Bezier surfaces are the surface") {
   const BezierSurface surface = some_surface(numbers, 3, 4);
   const BSplineSurface spline = as_spline(surface);
   const BezierSurface raised = elevate(surface, 5, 6);
-  const Box box{0.25, 0.75, 0.875, 0.125};
+  const ParameterBox box{0.25, 0.75, 0.875, 0.125};
   const BezierSurface part = restrict_to(surface, box);
   for (const auto& [s, t] : {std::pair{0.0, 0.0}, {0.3, 0.8}, {1.0, 0.6}}) {
     const BSplineSurface of_raised = as_spline(raised), of_part = as_spline(part);

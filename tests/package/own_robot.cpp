@@ -1,0 +1,181 @@
+#include "package/own_robot.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+// Text in memory that is there: from_chars() lies in the standard library, which the compiler cannot see through.
+MOLDLOFT_CHECKED_AT_RUN_TIME
+
+namespace own {
+
+using hal::Instant;
+using hal::Pose;
+using hal::RobotEvent;
+using hal::RobotState;
+using Kind = RobotEvent::Kind;
+
+namespace {
+
+constexpr int stopped_code = 1;
+constexpr double farthest_mm = 10'000;  // a coordinate beyond it is no place of any arm
+
+// Six numbers and nothing behind them.
+std::optional<Pose> pose_from(std::string_view text) {
+  std::array<double, 6> values{};
+  for (double& value : values) {
+    if (text.empty() || text.front() != ' ') return std::nullopt;
+    text.remove_prefix(1);
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || !std::isfinite(value)) return std::nullopt;
+    text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  }
+  if (!text.empty()) return std::nullopt;
+  return Pose{values[0],
+              values[1],
+              values[2],
+              values[3] * hal::degree,
+              values[4] * hal::degree,
+              values[5] * hal::degree};
+}
+
+}  // namespace
+
+// ---- what the cell asks
+
+void OwnRobot::start(Instant now) {
+  if (started_) return;
+  started_ = true;
+  open(now);
+}
+
+bool OwnRobot::move(const Pose& target, int speed_percent, Instant now) {
+  const double most = std::max({std::abs(target.x_mm), std::abs(target.y_mm), std::abs(target.z_mm)});
+  if (state_ != RobotState::ready || !is_finite(target) || most > farthest_mm) return false;
+  if (speed_percent < 1 || speed_percent > 100) return false;
+  say(Line::format("M {:.3f} {:.3f} {:.3f} {:.3f} {:.3f} {:.3f} {}", target.x_mm, target.y_mm, target.z_mm,
+                   target.yaw / hal::degree, target.pitch / hal::degree, target.roll / hal::degree,
+                   speed_percent));
+  state_ = RobotState::commanded;
+  command_until_ = now + settings_.answer;
+  return true;
+}
+
+bool OwnRobot::calibrate(Instant) {
+  if (state_ != RobotState::ready) return false;
+  events_.push({.kind = Kind::done, .calibrated = true});
+  return true;
+}
+
+void OwnRobot::stop(Instant) { say("S"); }
+
+void OwnRobot::reset(Instant) {
+  latched_ = false;
+  if (state_ != RobotState::faulted) return;
+  state_ = RobotState::synchronising;
+  say("?");
+}
+
+// ---- bytes in, bytes out
+
+void OwnRobot::receive(Instant now) {
+  if (state_ == RobotState::offline) return;
+  std::array<std::byte, 256> bytes{};  // a line of 115200 baud brings 12 in a tick
+  const std::size_t count = link_.read(bytes);
+  for (std::size_t i = 0; i < count; ++i) {
+    const char c = static_cast<char>(bytes[i]);
+    if (c == '\n') {
+      take({in_.data(), in_size_}, now);
+      in_size_ = 0;
+    } else if (c != '\r') {
+      in_[std::min(in_size_, in_.size() - 1)] = c;  // a line that is too long is none of ours
+      in_size_ = std::min(in_size_ + 1, in_.size());
+    }
+  }
+}
+
+void OwnRobot::transmit(Instant now) {
+  if (!started_) return;
+  const hal::LinkState link = link_.state();
+  if (link == hal::LinkState::lost || link == hal::LinkState::closed) {
+    if (opening_ || state_ != RobotState::offline) return lose(link_.why(), now);
+    if (now >= open_at_) open(now);
+    return;
+  }
+  if (link != hal::LinkState::open) return;
+  if (opening_) {
+    opening_ = false;
+    state_ = latched_ ? RobotState::faulted : RobotState::synchronising;
+    out_size_ = in_size_ = 0;
+    heard_ = now, asked_ = now - settings_.question;
+  }
+  if (now - heard_ >= settings_.silence) return lose("the arm does not answer", now);
+  if (has_command() && now >= command_until_)
+    fail("the arm does not say how its command ended: look, then clear");
+  if (now - asked_ >= settings_.question) asked_ = now, say("?");
+  const std::size_t taken = link_.write(std::as_bytes(std::span{out_.data(), out_size_}));
+  std::copy(out_.begin() + static_cast<std::ptrdiff_t>(taken),
+            out_.begin() + static_cast<std::ptrdiff_t>(out_size_), out_.begin());
+  out_size_ -= taken;
+}
+
+void OwnRobot::say(std::string_view line) {
+  if (state_ == RobotState::offline || out_size_ + line.size() + 1 > out_.size()) return;
+  std::copy(line.begin(), line.end(), out_.begin() + static_cast<std::ptrdiff_t>(out_size_));
+  out_size_ += line.size();
+  out_[out_size_++] = '\n';
+}
+
+void OwnRobot::take(std::string_view line, Instant now) {
+  const char kind = line.empty() ? '\0' : line.front();
+  const std::string_view rest = line.empty() ? line : line.substr(1);
+  const auto pose = kind == 'P' || kind == 'D' ? pose_from(rest) : std::nullopt;
+  if (kind == 'P' && pose) {
+    heard_ = now;
+    if (state_ != RobotState::synchronising) return;
+    state_ = RobotState::ready;
+    events_.push({.kind = Kind::ready, .pose = *pose, .calibrated = true});
+  } else if (kind == 'A' && rest.empty() && state_ == RobotState::commanded) {
+    state_ = RobotState::moving;
+    command_until_ = now + settings_.motion;
+    events_.push({.kind = Kind::moving});
+  } else if (kind == 'D' && pose && state_ == RobotState::moving) {
+    state_ = RobotState::ready;
+    events_.push({.kind = Kind::done, .pose = *pose, .calibrated = true});
+  } else if (kind == 'E' && has_command()) {
+    int code = 0;
+    if (rest.empty() || std::from_chars(rest.data() + 1, rest.data() + rest.size(), code).ec != std::errc{})
+      return;
+    state_ = RobotState::ready;
+    events_.push({.kind = Kind::refused,
+                  .code = code,
+                  .text = code == stopped_code
+                              ? hal::Message{"the motion was stopped before it arrived"}
+                              : hal::Message::format("the arm refuses: its error {}", code)});
+  }
+}
+
+// ---- the link and the faults
+
+void OwnRobot::open(Instant now) {
+  opening_ = true;
+  open_at_ = now + settings_.back_off;
+  link_.open();
+}
+
+void OwnRobot::lose(std::string_view why, Instant now) {
+  why_ = hal::Message::format("robot: {}", why);
+  if (state_ != RobotState::offline) events_.push({.kind = Kind::lost, .text = why_});
+  state_ = RobotState::offline, opening_ = false;
+  open_at_ = now + settings_.back_off;
+  link_.close();
+}
+
+void OwnRobot::fail(std::string_view why) {
+  why_ = hal::Message::format("robot: {}", why);
+  latched_ = true;
+  state_ = RobotState::faulted;
+  events_.push({.kind = Kind::fault, .text = why_});
+}
+
+}  // namespace own
