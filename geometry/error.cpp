@@ -8,6 +8,14 @@ std::string_view to_string(Error error) noexcept {
       return "too few points for what is asked of them";
     case Error::not_finite:
       return "a number is NaN or infinite";
+    case Error::too_large:
+      return "a number is too large to calculate with";
+    case Error::no_extent:
+      return "the points or their domain have no extent in one direction";
+    case Error::sizes_differ:
+      return "columns that belong together differ in length";
+    case Error::impossible_setting:
+      return "a setting has a value that makes no sense";
     case Error::collinear:
       return "lines that should cross are parallel, or points span no area";
     case Error::not_four_sided:

@@ -10,12 +10,16 @@ namespace moldloft::geometry {
 enum class Error {
   // ---- points and numbers
   not_finite,       // NaN or infinity where a number was promised
+  too_large,        // a number whose square no double holds
   too_few_points,   // fewer than the unknowns, or none at all
   repeated_points,  // consecutive points in one place, or parameters that do not increase
   collinear,        // points that span no area, sides that do not meet
+  no_extent,        // all points, or the ends of a domain, at one place of an axis
   negative_weight,
-  capacity,      // more data than the memory plan holds
-  not_on_plate,  // the hint does not lie on anything that was measured
+  sizes_differ,        // columns or spans that belong together, of different lengths
+  impossible_setting,  // a setting that its header does not allow
+  capacity,            // more data than the memory plan holds
+  not_on_plate,        // the hint does not lie on anything that was measured
 
   // ---- knots and control points
   knots_not_increasing,

@@ -1,5 +1,7 @@
 #include "geometry/cad/face_edges.hpp"
 
+#include <cmath>
+
 namespace moldloft::geometry {
 
 namespace {
@@ -16,6 +18,7 @@ FaceLoop ready(const BSplineSurface& surface, const TrimLoop& loop, double toler
 }  // namespace
 
 std::expected<std::vector<FaceLoop>, Error> face_edges(const TrimmedSurface& face, double tolerance_mm) {
+  if (!(tolerance_mm > 0) || !std::isfinite(tolerance_mm)) return std::unexpected(Error::impossible_setting);
   if (auto checked = check(face, tolerance_mm); !checked) return std::unexpected(checked.error());
   std::vector<FaceLoop> loops;
   const bool natural = face.outer.empty();

@@ -11,7 +11,7 @@
 //              the knots' range); space curves of trims within closure_mm of the surface
 // Cost         about 60 bytes a control point
 // Allocation   yes
-// Failure      what check() of splines/trimmed_surface.hpp finds
+// Failure      what check() of splines/trimmed_surface.hpp finds, impossible_setting: a closure_mm that is no length
 #pragma once
 
 #include <expected>

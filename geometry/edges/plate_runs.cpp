@@ -1,7 +1,6 @@
 #include "geometry/edges/plate_runs.hpp"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <limits>
 
@@ -306,7 +305,8 @@ std::expected<std::span<const PlateRun>, Error> PlateRunFinder::find(std::span<c
 std::expected<void, Error> PlateRunFinder::begin(std::span<const StripeView> stripes) {
   std::size_t points = 0;
   for (const StripeView& stripe : stripes) {
-    assert(stripe.x.size() == stripe.z.size() && stripe.y.size() == stripe.z.size());
+    if (stripe.x.size() != stripe.z.size() || stripe.y.size() != stripe.z.size())
+      return std::unexpected(Error::sizes_differ);
     points += stripe.z.size();
   }
   if (stripes.size() > max_stripes_ || points > max_points_) return std::unexpected(Error::capacity);

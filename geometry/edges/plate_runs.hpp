@@ -13,7 +13,7 @@
 // Cost         O(points); 50,000 points in 100 stripes take about 0.4 ms (moldloft-bench edges)
 // Allocation   in the constructor only
 // Failure      Error::not_on_plate when the hint hits nothing, not_finite when the hint is no number,
-//              capacity when the frame is larger than planned
+//              capacity when the frame is larger than planned, sizes_differ when a stripe's columns do
 #pragma once
 
 #include <Eigen/Core>

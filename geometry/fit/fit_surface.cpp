@@ -1,10 +1,9 @@
 #include "geometry/fit/fit_surface.hpp"
 
 #include <algorithm>
-#include <bit>
-#include <cassert>
 #include <cmath>
 
+#include "geometry/fit/fit_checks.hpp"
 #include "geometry/fit/robust_weights.hpp"
 #include "geometry/splines/band_condition.hpp"
 
@@ -12,12 +11,12 @@ namespace moldloft::geometry {
 
 namespace {
 
-constexpr int fewest_spans = 4;
-
 // A net is tried when it has at least this many points for every unknown.
 constexpr double points_an_unknown = 4;
 
-bool chooses(const FitSettings& settings) { return settings.control_u == 0 && settings.knots_u.empty(); }
+bool chooses(const FitSettings& settings) {
+  return settings.control_u == 0 && settings.control_v == 0 && settings.knots_u.empty();
+}
 
 std::vector<double> stretched(int spans, double begin, double end) {
   std::vector<double> knots = uniform_clamped_knots(spans);
@@ -33,20 +32,6 @@ struct Candidate {
   std::vector<double> coefficients = {};
   NetResult result = {};
 };
-
-std::expected<void, FitFailure> check(const FitSettings& settings) {
-  if (!settings.knots_u.empty() || !settings.knots_v.empty()) {
-    for (const auto* knots : {&settings.knots_u, &settings.knots_v}) {
-      if (const auto good = check_net_knots(*knots); !good) return good;
-    }
-  }
-  const FitDomain& d = settings.domain;
-  if (!(d.min_u < d.max_u && d.min_v < d.max_v) || !std::isfinite(d.max_u - d.min_u) ||
-      !std::isfinite(d.max_v - d.min_v)) {
-    return std::unexpected(FitFailure{Error::outside_domain});
-  }
-  return {};
-}
 
 Candidate candidate(const FitSettings& settings, int spans_u, int spans_v) {
   if (!settings.knots_u.empty()) {
@@ -126,6 +111,7 @@ class Fitter {
   Fitter(const FitSettings& settings, const MomentAccumulator& finest)
       : settings_(settings), finest_(finest) {
     candidates_.push_back(candidate(settings, finest.grid().cells_u(), finest.grid().cells_v()));
+    spread_ = check_spread(candidates_.front().net, finest.grid());
   }
 
   std::expected<void, FitFailure> run() {
@@ -140,9 +126,11 @@ class Fitter {
     if (candidates_.empty() || totals_.points == 0) {
       return std::unexpected(FitFailure{Error::too_few_points, totals_.points});
     }
-    solver_.emplace(candidates_.front().net.unknowns(), candidates_.front().net.half_band());
-    solver_->want_norm(settings_.condition);
+    if (!(totals_.weight > 0)) return std::unexpected(FitFailure{Error::too_few_points, totals_.points});
     set_boundary();
+    if (boundary_.empty()) {
+      if (const auto good = spread_; !good) return good;
+    }
     for (Candidate& c : candidates_) {
       if (const auto good = solve(c); !good) return good;
     }
@@ -150,9 +138,8 @@ class Fitter {
     if (chooses(settings_)) {
       if (const auto good = try_between(); !good) return good;
     }
-    // The solver still holds the last net's factor.
-    if (settings_.condition && &candidates_.back() != &candidates_[chosen_])
-      return solve(candidates_[chosen_]);
+    // The solver holds the factor of the net that came last, whichever was chosen.
+    if (settings_.condition && candidates_.size() > 1) return solve(candidates_[chosen_]);
     return {};
   }
 
@@ -256,7 +243,6 @@ class Fitter {
     const Eigen::MatrixXd& given = settings_.boundary.control;
     if (given.size() == 0) return;
     const SplineNet& net = candidates_.front().net;
-    assert(!chooses(settings_) && given.rows() == net.control_u() && given.cols() == net.control_v());
     boundary_.resize(static_cast<std::size_t>(net.unknowns()));
     for (int i = 0; i < net.control_u(); ++i) {
       for (int j = 0; j < net.control_v(); ++j) boundary_[net.index(i, j)] = given(i, j) - finest_.datum();
@@ -269,6 +255,11 @@ class Fitter {
       if (empty < static_cast<std::size_t>(c.net.cells_u()) * c.net.cells_v()) {
         return std::unexpected(FitFailure{Error::empty_cells, empty});
       }
+    }
+    // The nets between are larger than the nested ones that the points determined.
+    if (!solver_ || !solver_->holds(c.net)) {
+      solver_.emplace(c.net.unknowns(), c.net.half_band());
+      solver_->want_norm(settings_.condition);
     }
     solver_->start(task_for(c, grid(c), settings_, totals_, boundary_), nullptr);
     if (const auto solved = solver_->solve(); !solved) {
@@ -285,7 +276,8 @@ class Fitter {
   const FitSettings& settings_;
   const MomentAccumulator& finest_;
   std::vector<Candidate> candidates_;  // from fine to coarse
-  std::optional<NetSolver> solver_;
+  std::optional<NetSolver> solver_;    // has held every net that was solved
+  std::expected<void, FitFailure> spread_;
   std::vector<double> boundary_;
   PointTotals totals_;
   std::size_t chosen_ = 0;
@@ -373,21 +365,34 @@ ResidualPass residual_pass(const PointColumns& columns, const MomentAccumulator&
 }  // namespace
 
 std::expected<MomentAccumulator, FitFailure> accumulator_for(const FitSettings& settings, double datum) {
-  if (const auto good = check(settings); !good) return std::unexpected(good.error());
+  if (const auto good = check_settings(settings); !good) return std::unexpected(good.error());
   if (!settings.knots_u.empty()) {
     return MomentAccumulator(SplineNet(settings.knots_u, settings.knots_v), datum);
   }
-  assert(chooses(settings) || (settings.control_u >= 4 && settings.control_v >= 4));
-  assert(!chooses(settings) || (std::has_single_bit(static_cast<unsigned>(settings.finest_spans)) &&
-                                settings.finest_spans >= fewest_spans));
   const int u = chooses(settings) ? settings.finest_spans : settings.control_u - cubic;
   const int v = chooses(settings) ? settings.finest_spans : settings.control_v - cubic;
   return MomentAccumulator(u, v, settings.domain, datum);
 }
 
+namespace {
+
+bool has_cells_of(const MomentAccumulator& moments, const FitSettings& settings) {
+  const int u = moments.grid().cells_u(), v = moments.grid().cells_v();
+  if (!settings.knots_u.empty()) {
+    const SplineNet net(settings.knots_u, settings.knots_v);
+    return u == net.cells_u() && v == net.cells_v();
+  }
+  if (moments.domain() != settings.domain) return false;
+  if (!chooses(settings)) return u == settings.control_u - cubic && v == settings.control_v - cubic;
+  return u == settings.finest_spans && v == settings.finest_spans;
+}
+
+}  // namespace
+
 std::expected<FittedSurface, FitFailure> fit_moments(const MomentAccumulator& moments,
                                                      const FitSettings& settings) {
-  if (const auto good = check(settings); !good) return std::unexpected(good.error());
+  if (const auto good = check_settings(settings); !good) return std::unexpected(good.error());
+  if (!has_cells_of(moments, settings)) return std::unexpected(FitFailure{Error::sizes_differ});
   Fitter fitter(settings, moments);
   if (const auto good = fitter.run(); !good) return std::unexpected(good.error());
   return fitter.result();
@@ -401,6 +406,8 @@ std::expected<FittedSurface, FitFailure> fit_surface(const PointColumns& columns
   auto moments = accumulator_for(settings, datum);
   if (!moments) return std::unexpected(moments.error());
   if (const auto added = moments->add(columns); !added) return std::unexpected(added.error());
+  if (const auto good = check_sums(columns, moments->totals(), datum); !good)
+    return std::unexpected(good.error());
   std::optional<Fitter> fitter;
   fitter.emplace(settings, *moments);
   if (const auto good = fitter->run(); !good) return std::unexpected(good.error());
@@ -408,7 +415,9 @@ std::expected<FittedSurface, FitFailure> fit_surface(const PointColumns& columns
 
   std::optional<MomentAccumulator> weighted;
   double scale = out.report.sigma;
-  for (int pass = 0; pass < settings.robust_passes; ++pass) {
+  // Heights that are met to rounding have no spread to weigh them by.
+  const double rounding = 1e-14 * std::sqrt(out.report.totals.squares / out.report.totals.weight);
+  for (int pass = 0; pass < settings.robust_passes && scale > rounding; ++pass) {
     const Candidate before = fitter->chosen();
     weighted.emplace(*accumulator_for(settings, datum));
     const ResidualPass residuals = residual_pass(columns, *moments, before, scale, &*weighted);

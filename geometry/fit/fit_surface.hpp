@@ -19,7 +19,12 @@
 //              truth
 // Cost         450,000 points on 23 x 23: 3 ms (AVX-512); the choice among five nets 10 ms
 // Memory       independent of the number of points: <= 1 MiB on 23 x 23, 10 MiB on 64 x 64
-// Failure      FitFailure names the error and the point, cell, coefficient or knot that it is about
+// Points       any order; a net is chosen only among those with at least 4 points for every control point, so a
+//              choice wants 196 of them (a given net 1 each, and with fairing any three that are on no line)
+// Failure      FitFailure names the error and the point, cell, coefficient or knot that it is about: not_finite,
+//              too_large, negative_weight, outside_domain, sizes_differ, too_few_points, collinear (in plan
+//              view), no_extent (of the domain), empty_cells, singular, impossible_setting, capacity, those of
+//              knots.hpp
 #pragma once
 
 #include <expected>

@@ -167,8 +167,9 @@ void MomentAccumulator::fold(PointBlock& block) {
 }
 
 std::expected<void, FitFailure> MomentAccumulator::add(const PointColumns& columns) {
-  assert(columns.u.size() == columns.size() && columns.v.size() == columns.size());
-  assert(columns.weight.empty() || columns.weight.size() == columns.size());
+  if (columns.u.size() != columns.size() || columns.v.size() != columns.size() ||
+      (!columns.weight.empty() && columns.weight.size() != columns.size()))
+    return std::unexpected(FitFailure{Error::sizes_differ});
   PointBlock block;
   for (std::size_t first = 0; first < columns.size(); first += PointBlock::capacity) {
     const auto good = read(columns, first, block);

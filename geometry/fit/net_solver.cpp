@@ -35,6 +35,11 @@ std::size_t NetSolver::bytes() const {
          (right_.capacity() + data_diagonal_.capacity() + column_sums_.capacity()) * sizeof(double);
 }
 
+bool NetSolver::holds(const SplineNet& net) const {
+  const auto unknowns = static_cast<std::size_t>(net.unknowns());
+  return unknowns <= right_.size() && matrix_.holds(unknowns, static_cast<std::size_t>(net.half_band()));
+}
+
 void NetSolver::start(const NetTask& task, ShotOffsets* shots) {
   task_ = task;
   shots_ = task.shot_sigma_mm > 0 && shots != nullptr && shots->count() > 0 ? shots : nullptr;
@@ -42,6 +47,10 @@ void NetSolver::start(const NetTask& task, ShotOffsets* shots) {
   assert(task.boundary.empty() || static_cast<int>(task.boundary.size()) == size());
   result_ = {};
   result_.point_sigma_mm = task.point_sigma_mm;
+  if (!holds(*task.net)) {
+    phase_ = Phase::net_too_large;
+    return;
+  }
   matrix_.reset(size(), task.net->half_band());
   trace_data_ = objective_ = border_squares_ = norm_one_ = 0;
   cursor_ = column_ = row_ = 0, shot_cell_ = 0;
@@ -383,12 +392,15 @@ std::expected<bool, Error> NetSolver::piece() {
             for (; a < b; ++a) subtract_sparse_energy(a);
           })) {
         finish();
+        if (!std::isfinite(result_.squares)) return std::unexpected(Error::too_large);
         phase_ = Phase::done;
         return true;
       }
       return false;
     case Phase::done:
       return true;
+    case Phase::net_too_large:
+      return std::unexpected(Error::capacity);
   }
   return true;
 }

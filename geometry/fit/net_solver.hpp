@@ -8,7 +8,8 @@
 // Cost         unknowns * half_band^2 / 2 in all. A step takes at most `work_a_step` multiply-adds, or, if that is
 //              more, one panel of eight columns or one column of at most 52,000; work() counts them
 // Allocation   in the constructor only
-// Failure      Error::singular where a pivot is not positive; singular_unknown() says which
+// Failure      Error::singular where a pivot is not positive; singular_unknown() says which. capacity where the net
+//              is larger than the constructor was told; too_large where a sum overflows
 #pragma once
 
 #include <cstdint>
@@ -63,6 +64,7 @@ class NetSolver {
 
   NetSolver(std::size_t max_unknowns, std::size_t max_half_band);
 
+  bool holds(const SplineNet&) const;
   void start(const NetTask&, ShotOffsets*);
   std::expected<bool, Error> step(double budget = work_a_step);  // of multiply-adds
   std::expected<void, Error> solve();                            // all steps
@@ -96,7 +98,8 @@ class NetSolver {
     backward,
     energy,
     sparse_energy,
-    done
+    done,
+    net_too_large
   };
 
   int size() const { return task_.net->unknowns(); }

@@ -1,7 +1,6 @@
 #include "geometry/fit/stripe_curve.hpp"
 
 #include <algorithm>
-#include <cassert>
 
 namespace moldloft::geometry {
 
@@ -17,7 +16,7 @@ std::expected<StripeCurve, CurveFitError> fit_stripe(std::span<const Eigen::Vect
                                                      std::span<const Eigen::Vector2d> uv,
                                                      std::span<const double> knots,
                                                      StripeParameter parameter) {
-  assert(uv.size() == points.size());
+  if (uv.size() != points.size()) return std::unexpected(CurveFitError{Error::sizes_differ});
   if (points.size() < 2) return std::unexpected(CurveFitError{Error::too_few_points});
   const Eigen::Vector2d from = uv.front(), to = uv.back();
   if (!from.allFinite() || !to.allFinite()) return std::unexpected(CurveFitError{Error::not_finite});

@@ -8,8 +8,8 @@
 //              length
 // Cost         the curve fit's
 // Allocation   what is returned
-// Failure      CurveFitError: no_length (the pre-image), what fit_curve() finds (repeated_points: (u, v) that
-//              go backwards along the pre-image)
+// Failure      CurveFitError: sizes_differ, no_length (the pre-image), what fit_curve() finds (repeated_points:
+//              (u, v) that go backwards along the pre-image)
 #pragma once
 
 #include <Eigen/Core>

@@ -21,7 +21,7 @@ std::expected<void, InspectionError> measure_deviations(const PreparedSurface& s
                                                         std::span<const Eigen::Vector3d> points,
                                                         const DeviationSettings& settings,
                                                         std::span<Deviation> out) {
-  assert(out.size() >= points.size());
+  if (out.size() < points.size()) return std::unexpected(InspectionError{Error::sizes_differ});
   const PlainMotion design_from_plate(settings.design_from_plate);
   const Box& all = surface.box(surface.levels() - 1, 0, 0);
   const double near_square = near_share * near_share * (all.high - all.low).squaredNorm();
@@ -30,7 +30,8 @@ std::expected<void, InspectionError> measure_deviations(const PreparedSurface& s
   Parameters start;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p = design_from_plate * points[i];
-    if (!std::isfinite(p.x() + p.y() + p.z())) return std::unexpected(InspectionError{Error::not_finite, i});
+    if (!can_be_measured(p))
+      return std::unexpected(InspectionError{p.allFinite() ? Error::too_large : Error::not_finite, i});
     FootPoint foot;
     if (by_plan) {
       start = surface.guess_of(p);

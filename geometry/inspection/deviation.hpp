@@ -13,7 +13,8 @@
 //              the origin
 // Cost         0.1..0.25 us a point within 20 mm of an explicit surface; a summary 20 ns a point
 // Allocation   none
-// Failure      Error::not_finite with the point's index: nothing after it has been written
+// Failure      Error::not_finite or too_large with the point's index: nothing after it has been written.
+//              sizes_differ: fewer places than points, and nothing has been written
 #pragma once
 
 #include <array>

@@ -221,6 +221,18 @@ FootPoint foot_of(const Place& place, const Lanes& p, const Rectangle& domain) {
   return foot;
 }
 
+// Without a number to descend on: the place asked for, infinitely far off.
+FootPoint no_foot(const PreparedSurface& surface, double u, double v) {
+  const SurfacePoint at = surface.at(u, v);
+  FootPoint foot;
+  foot.u = u, foot.v = v;
+  foot.point = at.value;
+  const Vector3d across = at.du.cross(at.dv);
+  foot.normal = across.norm() > 0 ? across.normalized() : Vector3d::Zero();
+  foot.distance_mm = foot.signed_mm = foot.overhang_mm = std::numeric_limits<double>::infinity();
+  return foot;
+}
+
 Rectangle domain_of(const PreparedSurface& surface) {
   const KnotCells &in_u = surface.along_u(), &in_v = surface.along_v();
   return {in_u.first(), in_u.last(), in_v.first(), in_v.last()};
@@ -412,12 +424,18 @@ class Search {
 
 }  // namespace
 
+bool can_be_measured(const Vector3d& p) {
+  constexpr double most_mm = 1e100;
+  return std::abs(p.x()) <= most_mm && std::abs(p.y()) <= most_mm && std::abs(p.z()) <= most_mm;
+}
+
 FootPoint foot_near(const PreparedSurface& surface, const Vector3d& p, double u, double v,
                     FootAccuracy accuracy) {
   const Rectangle domain = domain_of(surface);
   const Lanes lanes = Lanes::of(p);
   u = u > domain.u0 ? std::min(u, domain.u1) : domain.u0;  // also where u is not a number
   v = v > domain.v0 ? std::min(v, domain.v1) : domain.v0;
+  if (!can_be_measured(p)) return no_foot(surface, u, v);
   const Enough& enough = accuracy == FootAccuracy::exact ? exact : by_distance;
   const Place place = descend(lanes, u, v, domain, enough, [&](double a, double b) -> const SpanPolynomial& {
     return surface.span_at(a, b);
@@ -426,6 +444,10 @@ FootPoint foot_near(const PreparedSurface& surface, const Vector3d& p, double u,
 }
 
 NearestFoot nearest_foot(const PreparedSurface& surface, const Vector3d& p, int budget) {
+  if (!can_be_measured(p)) {
+    const Rectangle domain = domain_of(surface);
+    return {no_foot(surface, domain.u0, domain.v0), std::numeric_limits<double>::infinity(), 0};
+  }
   return Search(surface, p, budget).run();
 }
 

@@ -13,13 +13,15 @@
 // Sign         signed_mm is (p - point) . normal, normal = r_u x r_v normalized: positive on the side to
 //              which the normal points, which for a plate with u along x and v along y is up
 // Accuracy     interior: |(point - p) . r_u| / |r_u| and the same along v <= 1e-12 mm for plates within 1e4
-//              mm of the origin and points up to 20 mm off
+//              mm of the origin and points up to 20 mm off; farther off a few eps of the distance
 // Cost         with a guess 0.1..0.25 us; global 1..3 us near a plate
 // Allocation   none
-// Failure      foot_near: `converged` is false after 40 steps, where the point is not finite, or on a crease
-//              (a knot of multiplicity 3 or more), where the equations have no solution. It finds a local
-//              minimum, never a place farther away than the guess's
+// Failure      foot_near: `converged` is false after 40 steps, or on a crease (a knot of multiplicity 3 or
+//              more), where the equations have no solution. It finds a local minimum, never a place farther
+//              away than the guess's
 //              nearest_foot: gap_mm, see below
+//              both: of a point that cannot be measured (can_be_measured()) `converged` is false, and
+//              distances and gap are infinite
 #pragma once
 
 #include <Eigen/Core>
@@ -46,6 +48,9 @@ struct FootPoint {
 // How near to the true foot: `exact` as stated above; `by_distance` within 1e-6 mm along the surface, which
 // leaves distances of a plate right to 1e-11 mm (they are least there) and saves a step.
 enum class FootAccuracy : std::uint8_t { exact, by_distance };
+
+// Every coordinate is a number within 1e100 mm, so that a double holds the square of its distance.
+bool can_be_measured(const Eigen::Vector3d& p);
 
 // The local foot that descends from (u, v).
 FootPoint foot_near(const PreparedSurface&, const Eigen::Vector3d& p, double u, double v,

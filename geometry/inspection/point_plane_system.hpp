@@ -52,6 +52,7 @@ class PointPlaneSystem {
   PointPlaneSums pass(const RigidMotion& design_from_plate, double tukey_mm = 0);
 
   std::span<const double> distances() const { return distances_; }  // of the last pass
+  std::span<const double> overhangs() const { return overhangs_; }
   std::span<const Parameters> feet() const { return feet_; }
   std::span<const std::array<double, 6>> rows() const { return rows_; }  // j; only after keep_rows()
   void keep_rows() { rows_.resize(points_.size()); }

@@ -51,6 +51,9 @@ std::expected<void, Error> check(const std::vector<double>& knots, Eigen::Index 
   return {};
 }
 
+// Clamped; what is not a number goes to the lower end, for it becomes the number of a cell.
+double held(double t, double low, double high) { return t > low ? std::min(t, high) : low; }
+
 Box joined(const Box& a, const Box& b) { return {a.low.cwiseMin(b.low), a.high.cwiseMax(b.high)}; }
 
 }  // namespace
@@ -266,8 +269,8 @@ void PreparedSurface::build_plan(const BSplineSurface& surface) {
 }
 
 Parameters PreparedSurface::plan_guess(double x, double y) const {
-  const double a = std::clamp((x - plan_x_) * per_x_, 0.0, static_cast<double>(plan_u_ - 1));
-  const double b = std::clamp((y - plan_y_) * per_y_, 0.0, static_cast<double>(plan_v_ - 1));
+  const double a = held((x - plan_x_) * per_x_, 0, plan_u_ - 1),
+               b = held((y - plan_y_) * per_y_, 0, plan_v_ - 1);
   const int i = std::min(static_cast<int>(a), plan_u_ - 2), j = std::min(static_cast<int>(b), plan_v_ - 2);
   const double s = a - i, t = b - j;
   const Parameters* node = &plan_[static_cast<std::size_t>(i * plan_v_ + j)];
@@ -304,8 +307,8 @@ Parameters PreparedSurface::guess_of(const Vector3d& p) const {
 }
 
 SurfacePoint PreparedSurface::at(double u, double v) const {
-  u = std::clamp(u, along_u_.first(), along_u_.last());
-  v = std::clamp(v, along_v_.first(), along_v_.last());
+  u = held(u, along_u_.first(), along_u_.last());
+  v = held(v, along_v_.first(), along_v_.last());
   const SpanPolynomial& polynomial = span_at(u, v);
   const SurfaceJet jet = polynomial.at(u, v);
   return {(polynomial.origin + jet.value).vector(),

@@ -24,8 +24,12 @@ BandCholesky::BandCholesky(std::size_t max_size, std::size_t max_half_band, Simd
   start_ = band_.data() + lead;
 }
 
+bool BandCholesky::holds(std::size_t size, std::size_t half_band) const {
+  return storage(size, half_band) <= band_.size() && 16 * (half_band + 24) <= pack_.size();
+}
+
 void BandCholesky::reset(int size, int half_band) {
-  assert(storage(size, half_band) <= band_.size() && 16u * (half_band + 24) <= pack_.size());
+  assert(holds(static_cast<std::size_t>(size), static_cast<std::size_t>(half_band)));
   size_ = size, half_band_ = half_band;
   ld_ = static_cast<std::ptrdiff_t>(leading_dimension(half_band));
   pivots_ = {.smallest = std::numeric_limits<double>::infinity()};

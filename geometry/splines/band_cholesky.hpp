@@ -23,6 +23,7 @@ class BandCholesky {
  public:
   BandCholesky(std::size_t max_size, std::size_t max_half_band, Simd = widest_simd());
 
+  bool holds(std::size_t size, std::size_t half_band) const;
   void reset(int size, int half_band);  // sizes only; clear() the columns before adding to them
   void clear(int first_column, int end_column);
   int size() const { return size_; }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -18,7 +17,7 @@ std::unexpected<CurveFitError> failed(Error what, std::ptrdiff_t where) {
 template <int dim>
 std::optional<CurveFitError> what_is_wrong(Points<dim> points, std::span<const double> parameters,
                                            double begin, double end) {
-  assert(points.size() == parameters.size());
+  if (points.size() != parameters.size()) return CurveFitError{Error::sizes_differ};
   for (std::size_t i = 0; i < points.size(); ++i) {
     const int where = static_cast<int>(i);
     if (!points[i].allFinite() || !std::isfinite(parameters[i]))

@@ -26,6 +26,7 @@ namespace moldloft::geometry {
 // repeated_points      points where - 1 and where lie in one place, or the parameter `where` is below the one
 //                      before it
 // outside_domain       the parameter `where` lies off the knots' domain
+// sizes_differ         not as many parameters as points
 // span_without_points  Schoenberg and Whitney: control point `where` has no parameter of its own between
 //                      knots[where] and knots[where + degree + 1]
 // singular             it has, but so near the border of that span that rounding decides about control point

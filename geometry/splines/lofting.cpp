@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <cmath>
 
 #include "geometry/splines/curve_fit.hpp"
@@ -77,13 +76,13 @@ std::expected<Loft, LoftError> loft(std::span<const SpaceCurve> curves, const Lo
   if (const auto checked = check_together(curves); !checked) return std::unexpected(checked.error());
   const auto parameters = loft_parameters(curves);
   if (!parameters) return std::unexpected(parameters.error());
-  assert(control_points > settings.degree);
+  if (control_points <= settings.degree) return failed(Error::too_few_points, control_points);
   return loft(curves, *parameters, balanced_knots(*parameters, control_points, settings.degree), settings);
 }
 
 std::expected<Loft, LoftError> loft(std::span<const SpaceCurve> curves, std::span<const double> parameters,
                                     std::span<const double> knots_u, const LoftSettings& settings) {
-  assert(curves.size() == parameters.size());
+  if (curves.size() != parameters.size()) return failed(Error::sizes_differ, std::ssize(parameters));
   const int degree = settings.degree, control_u = static_cast<int>(knots_u.size()) - degree - 1;
   if (const auto checked = check_knots(knots_u, degree, control_u); !checked)
     return failed(checked.error(), 0);

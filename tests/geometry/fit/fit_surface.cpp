@@ -287,7 +287,7 @@ TEST_CASE("what cannot be fitted is named with its place") {
   CHECK(fit_surface(points.columns(),
                     {.knots_u = {0, 0, 0, 0, 0.7, 0.5, 1, 1, 1, 1}, .knots_v = {0, 0, 0, 0, 1, 1, 1, 1}})
             .error() == FitFailure{Error::knots_not_increasing, 5});
-  CHECK(fit_surface(points.columns(), {.domain = {0, 0, 0, 1}}).error().error == Error::outside_domain);
+  CHECK(fit_surface(points.columns(), {.domain = {0, 0, 0, 1}}).error().error == Error::no_extent);
 
   // Every cell has points, but those of the last row of cells lie where it begins: nothing holds the last
   // row of control points, whose functions are zero there.
@@ -311,4 +311,147 @@ TEST_CASE("a fit on 23 x 23 holds less than a mebibyte above its points, whateve
   }
   CHECK(bytes[0] == bytes[1]);
   CHECK(bytes[0] <= 1024 * 1024);
+}
+
+TEST_CASE("a net is chosen from 16 to 5,000 points, smooth and wavy, scattered and gridded, in any order") {
+  const auto smooth = [](double u, double v) { return 20 * u * u - 10 * u * v + v; };
+  const auto wavy = [](double u, double v) { return 5 * std::sin(25 * u) * std::cos(21 * v); };
+  for (const int size :
+       {16, 100, 195, 196, 225, 256, 300, 400, 483, 484, 700, 1000, 1169, 2025, 3000, 4900, 5000}) {
+    for (const bool waves : {false, true}) {
+      for (const int order : {0, 1, 2}) {  // scattered, gridded along u, along v
+        test::FitPoints points =
+            test::fit_points(size, static_cast<unsigned>(size), 0.01,
+                             [&](double u, double v) { return waves ? wavy(u, v) : smooth(u, v); });
+        const int side = static_cast<int>(std::sqrt(size));
+        for (int k = 0; order > 0 && k < side * side; ++k) {
+          const auto at = static_cast<std::size_t>(k);
+          points.u[at] = (order == 1 ? k / side : k % side) / (side - 1.0);
+          points.v[at] = (order == 1 ? k % side : k / side) / (side - 1.0);
+          points.z[at] = waves ? wavy(points.u[at], points.v[at]) : smooth(points.u[at], points.v[at]);
+        }
+        CAPTURE(size);
+        CAPTURE(waves);
+        CAPTURE(order);
+        const auto fitted = fit_surface(points.columns(), {.residual_pass = true, .condition = true});
+        if (size < 196) {
+          CHECK(fitted.error() == FitFailure{Error::too_few_points, static_cast<std::uint64_t>(size)});
+          continue;
+        }
+        REQUIRE(fitted.has_value());
+        double squares = 0, largest = 0;
+        for (std::size_t i = 0; i < points.u.size(); ++i) {
+          const double off = points.z[i] - fitted->surface.at(points.u[i], points.v[i]).value.z();
+          squares += off * off, largest = std::max(largest, std::abs(off));
+        }
+        // 1e-11 of the heights' range in the coefficients, and sums of squares that lose half of their digits.
+        CHECK(std::abs(fitted->report.rms_residual - std::sqrt(squares / size)) < 1e-6);
+        CHECK(std::abs(fitted->report.max_residual - largest) < 1e-9);
+        CHECK(fitted->report.condition >= 1);
+        if (!waves) CHECK(largest < 0.1);
+      }
+    }
+  }
+}
+
+TEST_CASE("a solver refuses a net that is larger than it was built for") {
+  const SplineNet large(8, 8);
+  const MomentGrid moments(8, 8);
+  NetTask task;
+  task.net = &large, task.moments = &moments;
+  NetSolver solver(static_cast<std::size_t>(SplineNet(4, 4).unknowns()), 24);
+  CHECK(!solver.holds(large));
+  solver.start(task, nullptr);
+  CHECK(solver.solve().error() == Error::capacity);
+}
+
+TEST_CASE("numbers no double can square, points on a line and settings without sense are refused by name") {
+  test::FitPoints points = test::fit_points(400, 14, 0.1, wave);
+  const auto error = [&](const FitSettings& settings) {
+    const auto fitted = fit_surface(points.columns(), settings);
+    REQUIRE(!fitted);
+    return fitted.error();
+  };
+  const double good = points.z[123];
+  for (const std::size_t at : {std::size_t{0}, std::size_t{123}}) {
+    const double kept = points.z[at];
+    for (const double large : {1e300, -1e200, 1e308}) {
+      points.z[at] = large;
+      CHECK(error({}) == FitFailure{Error::too_large, at});
+      CHECK(error({.control_u = 6, .control_v = 6}) == FitFailure{Error::too_large, at});
+    }
+    points.z[at] = kept;
+  }
+  points.z[123] = 1e100;  // nothing that one would measure, yet a number
+  CHECK(std::isfinite(fit_surface(points.columns(), {})->report.rms_residual));
+  points.z[123] = good;
+
+  for (const double bad : {-1.0, static_cast<double>(NAN)}) {
+    CHECK(error({.tolerance = bad}).error == Error::impossible_setting);
+    CHECK(error({.fairing = {.everywhere = bad}}).error == Error::impossible_setting);
+  }
+  CHECK(error({.control_u = 3, .control_v = 8}).error == Error::impossible_setting);
+  CHECK(error({.control_u = 8}).error == Error::impossible_setting);
+  CHECK(error({.control_u = -8, .control_v = -8}).error == Error::impossible_setting);
+  CHECK(error({.control_u = 1'000'000, .control_v = 1'000'000}).error == Error::capacity);
+  CHECK(error({.finest_spans = 5}).error == Error::impossible_setting);
+  CHECK(error({.finest_spans = 0}).error == Error::impossible_setting);
+  CHECK(error({.knots_u = {0, 0, 0, 0, 1, 1, 1, 1}}).error == Error::knots_wrong_count);
+  CHECK(error({.control_u = 6, .control_v = 6, .boundary = {.control = Eigen::MatrixXd::Zero(6, 7)}}).error ==
+        Error::sizes_differ);
+  CHECK(error({.domain = {0, NAN, 0, 1}}).error == Error::not_finite);
+  CHECK(error({.domain = {1, 0, 0, 1}}).error == Error::no_extent);
+  CHECK(error({.domain = {0, 1e-303, 0, 1}}).error == Error::no_extent);
+  const std::vector<double> short_column(399);
+  CHECK(fit_surface({.u = points.u, .v = short_column, .z = points.z}, {}).error().error ==
+        Error::sizes_differ);
+  CHECK(
+      fit_surface({.u = points.u, .v = points.v, .z = points.z, .weight = short_column}, {}).error().error ==
+      Error::sizes_differ);
+  CHECK(fit_moments(MomentAccumulator(8, 8), {.control_u = 6, .control_v = 6}).error().error ==
+        Error::sizes_differ);
+  CHECK(fit_moments(MomentAccumulator(8, 8), {.finest_spans = 16}).error().error == Error::sizes_differ);
+  const std::vector<double> nothing(400, 0.0);
+  CHECK(fit_surface({.u = points.u, .v = points.v, .z = points.z, .weight = nothing}, {}).error().error ==
+        Error::too_few_points);
+
+  for (std::size_t i = 0; i < 400; ++i) points.v[i] = 0.25 + 0.5 * points.u[i];
+  CHECK(error({}).error == Error::collinear);
+  CHECK(error({.control_u = 6, .control_v = 6}).error == Error::collinear);
+  for (std::size_t i = 0; i < 400; ++i) points.u[i] = points.v[i] = 0.3;
+  CHECK(error({}).error == Error::collinear);
+}
+
+TEST_CASE("the surface does not depend on where the origin lies nor on the unit of length") {
+  const test::FitPoints points = test::fit_points(1000, 15, 0.01, wave);
+  const auto here = fit_surface(points.columns(), {});
+  REQUIRE(here);
+  for (const double scale : {1e-3, 1.0, 1e6}) {
+    for (const double origin : {0.0, 1e6 * scale, -3e7 * scale}) {
+      test::FitPoints moved = points;
+      for (std::size_t i = 0; i < 1000; ++i) {
+        moved.u[i] = origin + scale * points.u[i], moved.v[i] = scale * points.v[i] - origin;
+        moved.z[i] = origin + scale * points.z[i];
+      }
+      const auto there =
+          fit_surface(moved.columns(), {.domain = {origin, origin + scale, -origin, scale - origin}});
+      REQUIRE(there);
+      REQUIRE(there->surface.control_u() == here->surface.control_u());
+      // Coordinates of 3e7 keep 4e-9 of the unit square, on slopes of 35; coefficients may carry some of that on.
+      const double off =
+          ((there->surface.z.array() - origin) / scale - here->surface.z.array()).abs().maxCoeff();
+      CHECK(off < (origin == 0 ? 1e-9 : 1e-5));
+    }
+  }
+}
+
+TEST_CASE("robust passes over heights that are met exactly leave them as they are") {
+  test::FitPoints points = test::fit_points(400, 16, 0, [](double u, double v) { return 2 * u - v; });
+  const auto fitted = fit_surface(points.columns(), {.robust_passes = 5});
+  REQUIRE(fitted);
+  CHECK(fitted->report.rms_residual < 1e-7);
+  for (double& z : points.z) z = 7;
+  const auto level = fit_surface(points.columns(), {.robust_passes = 5});
+  REQUIRE(level);
+  CHECK((level->surface.z.array() - 7).abs().maxCoeff() < 1e-12);
 }

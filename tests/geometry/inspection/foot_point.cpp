@@ -291,3 +291,32 @@ TEST_CASE("finding feet takes no memory") {
   CHECK(allocations() == before);
   CHECK((near.converged && nearest.pieces > 0));
 }
+
+TEST_CASE("a point that is no place has no foot, and every answer about it says so without a NaN") {
+  const double nan = std::nan(""), infinite = std::numeric_limits<double>::infinity();
+  for (const BSplineSurface& surface :
+       {yard_plate(), moved(motion_about({0, 0, 0}, 90, {1, 0, 0}, {0, 0, 0}), yard_plate())}) {
+    const auto prepared = PreparedSurface::from(surface);
+    for (const Vector3d& p : {Vector3d(nan, 0, 0), Vector3d(0, nan, 0), Vector3d(0, 0, nan),
+                              Vector3d(infinite, 0, 0), Vector3d(0, -infinite, 0), Vector3d(0, 0, infinite),
+                              Vector3d(1e300, 0, 0), Vector3d(0, -1e200, 5)}) {
+      const FootPoint near = foot_near(*prepared, p, 0.5, 0.5);
+      const NearestFoot all = nearest_foot(*prepared, p);
+      for (const FootPoint& foot : {near, all.foot}) {
+        CHECK(!foot.converged);
+        CHECK(foot.distance_mm == infinite);
+        CHECK(foot.point.allFinite());
+        CHECK(foot.normal.allFinite());
+        CHECK((foot.point - surface.at(foot.u, foot.v).value).norm() < 1e-9);
+      }
+      CHECK(all.gap_mm == infinite);
+      const Parameters guess = prepared->guess_of(p);
+      CHECK((guess.u >= 0 && guess.u <= 1 && guess.v >= 0 && guess.v <= 1));
+    }
+    CHECK(prepared->at(nan, nan).value.allFinite());
+    CHECK(foot_near(*prepared, {1, 2, 3}, nan, nan).converged);
+    // Far off is far off, and no more.
+    const NearestFoot far = nearest_foot(*prepared, {1e30, 0, 0});
+    CHECK(std::abs(far.foot.distance_mm / 1e30 - 1) < 1e-12);
+  }
+}
