@@ -22,10 +22,14 @@ geometry::CadLabel label_of(const CadFacts& facts, const std::string& file_name)
   std::string what = "measured plate surface, mm, world coordinates";
   if (facts.noise_mm) what += fmt::format("; noise of a point {:.4f} mm", *facts.noise_mm);
   if (facts.tolerance_mm) what += fmt::format("; tolerance of the fit {} mm", *facts.tolerance_mm);
+  std::vector<std::string> notes;
+  if (!facts.cell.empty()) notes.push_back("cell: " + facts.cell);
+  if (!facts.remark.empty()) notes.push_back("remark: " + facts.remark);
   return {.name = facts.plate,
           .description = what,
+          .notes = notes,
           .file_name = file_name,
-          .system = "Moldloft",
+          .system = facts.program.empty() ? "Moldloft" : "Moldloft " + facts.program,
           .stamp = stamp_of(facts.begun)};
 }
 
@@ -49,13 +53,22 @@ CadFacts cad_facts(const Json& summary) {
     if (found == in.end() || !found->is_number()) return {};
     return found->get<double>();
   };
-  const auto text = [&](const char* key, std::string& to) {
-    const auto found = summary.find(key);
-    if (found != summary.end() && found->is_string()) to = found->get<std::string>();
+  const auto text = [](const Json& in, const char* key, std::string& to) {
+    const auto found = in.find(key);
+    if (found != in.end() && found->is_string()) to = found->get<std::string>();
   };
   if (!summary.is_object()) return facts;
-  text("plate", facts.plate);
-  text("begun", facts.begun);
+  text(summary, "plate", facts.plate);
+  text(summary, "cell", facts.cell);
+  text(summary, "remark", facts.remark);
+  text(summary, "begun", facts.begun);
+  if (const auto program = summary.find("program"); program != summary.end() && program->is_object()) {
+    std::string version = "?", commit = "?", build = "?";
+    text(*program, "version", version);
+    text(*program, "commit", commit);
+    text(*program, "build", build);
+    facts.program = fmt::format("{} (commit {}; {})", version, commit, build);
+  }
   if (const auto surface = summary.find("surface"); surface != summary.end() && surface->is_object()) {
     facts.noise_mm = number(*surface, "sigma_mm");
     facts.tolerance_mm = number(*surface, "tolerance_mm");

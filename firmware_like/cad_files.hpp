@@ -17,6 +17,7 @@ namespace moldloft::firmware_like {
 
 struct CadFacts {
   std::string plate = "measured";
+  std::string cell, remark, program;   // empty: not known
   std::string begun;                   // "2026-11-25T15:04:05Z"; empty: not known
   std::optional<double> noise_mm;      // of one measured point about the surface
   std::optional<double> tolerance_mm;  // what the fit was allowed to miss, rms

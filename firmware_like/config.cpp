@@ -2,13 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <sstream>
 
-#include "firmware_like/memory_plan.hpp"
+#include "firmware_like/plate_name.hpp"
 #include "firmware_like/task_table.hpp"
 #include "firmware_like/toml_section.hpp"
 
@@ -149,41 +154,106 @@ void flatten(const toml::table& table, const std::string& prefix, std::map<std::
   }
 }
 
-// What no key can say alone. The error names the line of the first of `keys` that stands in the file: the others have
-// their defaults.
-std::string impossible(const toml::table& table, const std::string& path,
-                       std::initializer_list<std::string_view> keys, std::string_view what) {
-  std::string line;
-  for (const auto key : keys) {
-    const auto node = table.at_path(key);
-    if (node && line.empty()) line = fmt::format(":{}", node.node()->source().begin.line);
+// Where every key stands: what no key can say alone is told with the line of one of them.
+void note_lines(const toml::table& table, const std::string& prefix, std::map<std::string, int>& into) {
+  for (const auto& [key, value] : table) {
+    const std::string name = prefix + std::string{key.str()};
+    into.emplace(name, static_cast<int>(value.source().begin.line));
+    if (const auto* inner = value.as_table()) note_lines(*inner, name + ".", into);
   }
-  return fmt::format("{}{}: {}", path, line, what);
 }
 
-std::optional<std::string> check_together(const toml::table& table, const CellConfig& c) {
-  const double field = std::min(c.scanner.field_x_mm, c.scanner.field_y_mm);
-  if (2 * c.scan_overlap_mm > field) {
-    return impossible(
-        table, c.path, {"scan.overlap_mm", "scanner.field_mm"},
-        fmt::format("[scan] overlap_mm: {} is more than half of [scanner] field_mm", c.scan_overlap_mm));
+std::string line_at(const std::string& text, int line) {
+  std::istringstream lines{text};
+  std::string found;
+  for (int i = 0; i < line && std::getline(lines, found); ++i) continue;
+  if (found.ends_with('\r')) found.pop_back();
+  return found;
+}
+
+// Whether a line stands for itself: a key with a value that neither begins nor ends something longer. Without such a
+// line the rest of the file still means what it meant.
+bool stands_alone(std::string_view line) {
+  static constexpr std::string_view letters =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-. \t";
+  const auto equals = line.find_first_not_of(letters);
+  if (equals == line.npos) return line.find_first_not_of(" \t\r") != line.npos;  // a word and no value
+  const auto count = [&](char c) { return std::ranges::count(line, c); };
+  return equals > 0 && line[equals] == '=' && count('[') == count(']') && count('{') == count('}') &&
+         line.find("\"\"\"") == line.npos && line.find("'''") == line.npos;
+}
+
+// Whether an array or a table that was begun before this line is still open there: what follows is read as its inside.
+bool inside_brackets(const std::string& text, int line) {
+  std::istringstream lines{text};
+  std::string one;
+  long open = 0;
+  for (int i = 1; i < line && std::getline(lines, one); ++i) {
+    char quote = 0;
+    for (const char c : one) {
+      if (quote != 0)
+        quote = c == quote ? 0 : quote;
+      else if (c == '"' || c == '\'')
+        quote = c;
+      else if (c == '#')
+        break;
+      else
+        open += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
+    }
   }
-  // The next field is centred on the boundary's continuation: with more overlap than this the tracker would
-  // hardly advance.
-  if (2 * c.tracking_overlap_mm > 0.9 * field) {
-    return impossible(table, c.path, {"tracking.overlap_mm", "scanner.field_mm"},
-                      fmt::format("[tracking] overlap_mm: {} is more than 0.45 of [scanner] field_mm",
-                                  c.tracking_overlap_mm));
+  return open != 0;
+}
+
+// The file with its line `line` empty.
+std::string without_line(const std::string& text, int line) {
+  std::istringstream lines{text};
+  std::string kept, one;
+  for (int i = 1; std::getline(lines, one); ++i) kept += (i == line ? "" : one) + "\n";
+  return kept;
+}
+
+// The first byte that is not UTF-8 makes the parser stop there; people save files in Latin-1 and in UTF-16.
+std::optional<ConfigFinding> wrong_encoding(const std::string& text) {
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
+    return ConfigFinding{Severity::error, 1, "is UTF-16; save the file as UTF-8", {}};
+  const auto at = first_byte_not_utf8(text);
+  if (at == text.npos) return {};
+  const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n') + 1;
+  return ConfigFinding{Severity::error,
+                       static_cast<int>(line),
+                       fmt::format("byte 0x{:02X} is not UTF-8; save the file as UTF-8, or write ASCII",
+                                   static_cast<unsigned char>(text[at])),
+                       {}};
+}
+
+// What can be read of a text, and what makes it no TOML: lines that stand for themselves are passed over, so that the
+// errors after them are found as well; after any other the rest would be read for something else.
+std::optional<toml::table> parsed_table(std::string text, std::vector<ConfigFinding>& findings) {
+  constexpr int most_errors = 50;
+  for (int errors = 0; errors < most_errors; ++errors) {
+    try {
+      return toml::parse(text);
+    } catch (const toml::parse_error& e) {
+      const int line = static_cast<int>(e.source().begin.line);
+      findings.push_back({Severity::error, line, std::string{e.description()}, {}});
+      if (inside_brackets(text, line) || !stands_alone(line_at(text, line))) return {};
+      text = without_line(text, line);
+    }
   }
-  const tasks::CellSettings cell = cell_settings(c);
-  if (const std::size_t shots = static_cast<std::size_t>(cell.tracker.max_shots) + cell.max_surface_shots;
-      shots > tasks::max_shot_number) {
-    return impossible(
-        table, c.path, {"plate.largest_mm", "scanner.field_mm", "tracking.overlap_mm"},
-        fmt::format("[plate] largest_mm: asks for {} shots of this field, a run takes {} at most", shots,
-                    tasks::max_shot_number));
+  return {};
+}
+
+// A rule that leans on a key whose own value is wrong says nothing.
+void add_contradictions(const CellConfig& config, std::vector<ConfigFinding>& findings) {
+  const std::vector<ConfigFinding> wrong = findings;
+  const auto is_wrong = [&](const std::string& key) {
+    return std::ranges::any_of(wrong, [&](const ConfigFinding& f) {
+      return !f.keys.empty() && (f.keys.front() == key || key.starts_with(f.keys.front() + "."));
+    });
+  };
+  for (auto& finding : contradictions(config)) {
+    if (std::ranges::none_of(finding.keys, is_wrong)) findings.push_back(std::move(finding));
   }
-  return std::nullopt;
 }
 
 }  // namespace
@@ -221,37 +291,65 @@ CellConfig default_config() {
   return c;
 }
 
-std::expected<CellConfig, ConfigError> parse_config(const std::string& text, const std::string& path) {
-  CellConfig config = default_config();
+ExaminedConfig examine_config(const std::string& text, const std::string& path) {
+  ExaminedConfig examined{.config = default_config(), .findings = {}};
+  CellConfig& config = examined.config;
   config.path = path;
   config.text = text;
-  std::optional<std::string> error;
-  try {
-    const toml::table table = toml::parse(text, path);
-    TomlSection file{&table, "", path, error};
-    int schema = 1;
-    file.integer("schema", schema, 1, 1);
-    read_scanner(file.section("scanner"), config.scanner);
-    read_robot(file.section("robot"), config.robot);
-    read_rest(file, config);
-    read_realtime(file.section("realtime"), config.realtime);
-    file.finish();
-    if (!error) error = check_together(table, config);
-  } catch (const toml::parse_error& e) {
-    error = fmt::format("{}:{}: {}", path, e.source().begin.line, e.description());
+  if (auto encoding = wrong_encoding(text)) {
+    examined.findings.push_back(std::move(*encoding));
+    return examined;
   }
-  if (error) return std::unexpected{ConfigError{*error}};
-  return config;
+  const auto table = parsed_table(text, examined.findings);
+  if (!table) return examined;
+  note_lines(*table, "", config.key_lines);
+  TomlSection file{&*table, "", examined.findings};
+  int schema = 1;
+  file.integer("schema", schema, 1, 1);
+  read_scanner(file.section("scanner"), config.scanner);
+  read_robot(file.section("robot"), config.robot);
+  read_rest(file, config);
+  read_realtime(file.section("realtime"), config.realtime);
+  file.finish();
+  add_contradictions(config, examined.findings);
+  std::ranges::stable_sort(examined.findings, {}, &ConfigFinding::line);
+  return examined;
+}
+
+std::expected<CellConfig, ConfigError> parse_config(const std::string& text, const std::string& path) {
+  auto examined = examine_config(text, path);
+  std::string errors;
+  for (const auto& finding : examined.findings) {
+    if (finding.severity == Severity::error)
+      errors += (errors.empty() ? "" : "\n") + finding_text(path, finding);
+  }
+  if (!errors.empty()) return std::unexpected{ConfigError{std::move(errors)}};
+  return std::move(examined.config);
+}
+
+std::expected<std::string, ConfigError> read_config(const std::string& path) {
+  constexpr std::size_t longest = 1u << 20;  // a cell is described in a few kilobytes; a device may never end
+  const auto refused = [&](std::string_view why) {
+    return std::unexpected{
+        ConfigError{fmt::format("{}: {}; give the path of a cell configuration", path, why)}};
+  };
+  std::error_code failed;
+  if (std::filesystem::is_directory(path, failed)) return refused("is a directory");
+  errno = 0;
+  std::ifstream file{path, std::ios::binary};
+  if (!file) return refused(fmt::format("cannot be read: {}", strerrordesc_np(errno != 0 ? errno : EIO)));
+  std::string text(longest + 1, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (file.bad()) return refused("cannot be read");
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.size() > longest) return refused("has more than 1 MiB");
+  return text;
 }
 
 std::expected<CellConfig, ConfigError> load_config(const std::string& path) {
-  std::ifstream file{path};
-  std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) {
-    return std::unexpected{
-        ConfigError{fmt::format("{}: cannot be read; give the path of a cell configuration", path)}};
-  }
-  return parse_config(text.str(), path);
+  const auto text = read_config(path);
+  if (!text) return std::unexpected{text.error()};
+  return parse_config(*text, path);
 }
 
 }  // namespace moldloft::firmware_like

@@ -1,12 +1,15 @@
 // The cell's configuration: one TOML file a cell, every key explained in cell.example.toml beside this file.
 //
-// Strict on purpose: an unknown key, a wrong type or an impossible value is one line with file, line, key and what is
-// allowed, because a misspelt limit that silently keeps its default is how arms meet plates.
+// Strict on purpose: an unknown key, a wrong type, an impossible value or a contradiction is one line with file, line,
+// key and what is allowed, because a misspelt limit that silently keeps its default is how arms meet plates.
 #pragma once
 
 #include <expected>
+#include <map>
 #include <string>
+#include <vector>
 
+#include "firmware_like/config_rules.hpp"
 #include "firmware_like/realtime_config.hpp"
 #include "hal/psc1.hpp"
 #include "tasks/cell.hpp"
@@ -14,7 +17,7 @@
 namespace moldloft::firmware_like {
 
 struct ConfigError {
-  std::string what;  // "cell.toml:12: [robot] baud: ..."
+  std::string what;  // "cell.toml:12: [robot] baud: ...", a line for each error
 };
 
 struct ScannerConfig {
@@ -47,6 +50,7 @@ struct PlateConfig {
 
 struct CellConfig {
   std::string path, text;  // where it came from and as it stood there; kept in the run store
+  std::map<std::string, int> key_lines;  // "robot.baud" -> 12, of the keys that stand there
   std::string name = "cell";
   hal::Duration tick = std::chrono::milliseconds{1};
   tasks::MissedTickPolicy missed_ticks = tasks::MissedTickPolicy::skip_keep_phase;
@@ -68,6 +72,14 @@ struct CellConfig {
 
 CellConfig default_config();
 std::expected<CellConfig, ConfigError> load_config(const std::string& path);
+
+// All that is wrong with a text and all that looks wrong, by line. The configuration holds what could be read.
+struct ExaminedConfig {
+  CellConfig config;
+  std::vector<ConfigFinding> findings;
+};
+ExaminedConfig examine_config(const std::string& text, const std::string& path);
+std::expected<std::string, ConfigError> read_config(const std::string& path);  // the file's text
 std::expected<CellConfig, ConfigError> parse_config(const std::string& text, const std::string& path);
 
 // The first key whose value differs between two configurations and would make a run measure differently

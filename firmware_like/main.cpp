@@ -3,6 +3,9 @@
 
 #include <CLI/CLI.hpp>
 
+#include "firmware_like/build_info.hpp"
+#include "firmware_like/check_command.hpp"
+#include "firmware_like/command_line.hpp"
 #include "firmware_like/export_command.hpp"
 #include "firmware_like/latency_command.hpp"
 #include "firmware_like/machines.hpp"
@@ -14,22 +17,33 @@
 using namespace moldloft::firmware_like;
 
 int main(int argc, char** argv) {
-  CLI::App app{"Moldloft: measures formed ship plates with a laser-stripe scanner on a robot"};
+  CLI::App app{"Moldloft: measures formed ship plates with a laser-stripe scanner on a robot", "moldloft"};
+  app.set_version_flag("--version", "moldloft " + version_text(), "version, commit and compiler");
   app.require_subcommand(1);
 
   RunOptions run;
   auto* run_command = app.add_subcommand("run", "measure one plate on the cell's devices");
   run_command->add_option("config", run.config_path, "the cell's configuration (TOML)")->required();
   run_command->add_option("--out", run.out, "the run's folder; default: a new one under out/");
+  run_command->add_option_function<std::string>(
+      "--plate", [&](const std::string& name) { run.plate = name; },
+      "the plate's name in all results; default: the folder's");
+  run_command->add_option_function<std::string>(
+      "--remark", [&](const std::string& text) { run.remark = text; },
+      "one line of yours that goes into all results");
   run_command->add_flag("--resume", run.resume, "go on with the run in --out after its last stored shot");
 
-  run_command->add_flag(
-      "--resume-held", run.resume_held,
-      "begin the run in --out or go on with it, but come up held until `moldloft tell unhold`");
+  run_command->add_flag("--resume-held", run.resume_held,
+                        "begin or go on with the run in --out, held until told unhold");
   run_command->add_option("--control", run.control,
-                          "socket for `moldloft tell`; with it what waits for a person is waited for");
+                          "socket for `moldloft tell`; with it a person is waited for");
   run_command->add_option("--go-on", run.go_on,
-                          "for what starts this program: the command to advise when the run can go on");
+                          "of what starts this program: the command to advise");
+
+  CheckOptions check;
+  auto* check_command = app.add_subcommand("check", "all that can be known before a plate is measured");
+  check_command->add_option("config", check.config, "the cell's configuration (TOML)")->required();
+  check_command->add_flag("--connect", check.connect, "ask both devices too: one exposure, no motion");
 
   TellOptions tell;
   auto* tell_command = app.add_subcommand("tell", "command a running cell, or ask for its status");
@@ -79,12 +93,9 @@ int main(int argc, char** argv) {
 
   auto* machines_command = app.add_subcommand("machines", "print the state machines as Mermaid diagrams");
 
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? exit_done : exit_failed;
-  }
+  if (const auto ended = parse_command_line(app, argc, argv)) return *ended;
   if (*run_command) return run_cell(run);
+  if (*check_command) return check_cell(check);
   if (*tell_command) return tell_cell(tell);
   if (*fit_command) return fit_run(fit);
   if (*export_command) return export_run(to_cad);

@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double margin_px = 30, head_px = 70;
+constexpr double margin_px = 30, head_px = 86;
 constexpr double panel_px = 520, stacked_panel_px = 860, tallest_px = 640;  // a panel's plot fits into these
 constexpr double scale_px = 90;  // beside a plot: the colours and their values
 constexpr double under_px = 44,
@@ -160,13 +160,14 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
-// A plate that is a file is called by the file's name: where it lies is in summary.json.
-std::string without_path(const std::string& title) {
-  const auto first = title.find('/'), last = title.rfind('/');
-  if (first == std::string::npos) return title;
-  const auto blank = title.rfind(' ', first);
-  const auto begin = blank == std::string::npos ? 0 : blank + 1;
-  return title.substr(0, begin) + title.substr(last + 1);
+// As much of a line as the picture is wide.
+std::string fitting(std::string_view line, double width_px) {
+  constexpr double letter_px = 6.6;  // of the small type, a wide one
+  const auto room = static_cast<std::size_t>(std::max((width_px - 2 * margin_px) / letter_px, 8.0));
+  if (line.size() <= room) return std::string{line};
+  std::size_t end = room - 3;
+  while (end > 0 && (static_cast<unsigned char>(line[end]) & 0xC0u) == 0x80u) --end;  // inside a character
+  return std::string{line.substr(0, end)} + "...";
 }
 
 // One path for each colour: cells of a colour together, so that the file stays small.
@@ -312,9 +313,10 @@ std::string overview_svg(const OverviewInput& in) {
       ".shot{{font-size:10px;text-anchor:middle;fill:#444}}</style>\n"
       "<rect width='100%' height='100%' fill='#fff'/>\n"
       "<text x='{2:.0f}' y='22' font-size='16' font-weight='bold'>{3}</text>"
-      "<text x='{2:.0f}' y='40' font-size='12'>{4}</text>\n",
-      layout.width(), layout.bottom() + legend_px, margin_px, escaped(without_path(in.title)),
-      escaped(in.subtitle));
+      "<text x='{2:.0f}' y='40' font-size='12'>{4}</text>\n"
+      "<text x='{2:.0f}' y='57' class='small'>{5}</text>\n",
+      layout.width(), layout.bottom() + legend_px, margin_px, escaped(in.title), escaped(in.subtitle),
+      escaped(fitting(in.about, layout.width())));
   for (std::size_t i = 0; i < layout.panels; ++i) {
     view.left = layout.left(i);
     view.top = layout.top(i);

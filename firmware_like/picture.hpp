@@ -25,7 +25,8 @@ struct PlateField {
 };
 
 struct OverviewInput {
-  std::string title, subtitle;                        // a path in the title is cut down to the file's name
+  std::string title, subtitle;
+  std::string about = {};                             // whose run it is; cut where it would leave the picture
   const geometry::BSplineSurface* surface = nullptr;  // null: only outline, path and shots
   std::span<const Eigen::Vector2d> edge_points{};
   std::span<const Eigen::Vector2d> corners{};

@@ -18,15 +18,17 @@ int report_run(const ReportOptions& options) {
   const std::filesystem::path folder{options.run};
   const auto timing = read_json(folder / "timing.json");
   if (!timing) return refuse(timing.error().what);
-  std::string text, page;
+  std::string text, page, title = page_title(folder), about;
   try {
     if (std::filesystem::exists(folder / "summary.json")) {
       const auto summary = read_json(folder / "summary.json");
       if (!summary) return refuse(summary.error().what);
       text = result_table(*summary, options.run) + "\n";
+      title = "Timing of " + summary->value("plate", "the plate");
+      about = about_run(*summary);
     }
     text += timing_table(*timing);
-    page = timing_page(*timing, page_title(folder));
+    page = timing_page(*timing, title, about);
   } catch (const Json::exception& e) {
     return refuse(fmt::format("{}: was not written by this version of moldloft ({})", options.run, e.what()));
   }

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "firmware_like/build_info.hpp"
 #include "firmware_like/cad_files.hpp"
 #include "firmware_like/measured_points.hpp"
 #include "firmware_like/ply_writer.hpp"
@@ -40,6 +41,25 @@ std::string result_word(const Controller& c) {
 
 }  // namespace
 
+std::string about_run(const Json& summary) {
+  std::string line;
+  const auto add = [&](std::string_view what, const Json& in, const char* key) {
+    const auto found = in.is_object() ? in.find(key) : in.end();
+    if (found == in.end() || !found->is_string() || found->empty()) return;
+    const auto text = found->get<std::string>();
+    if (!text.empty()) line += fmt::format("{}{}{}", line.empty() ? "" : "; ", what, text);
+  };
+  add("plate ", summary, "plate");
+  add("cell ", summary, "cell");
+  add("begun ", summary, "begun");
+  if (const auto program = summary.find("program"); program != summary.end()) {
+    add("moldloft ", *program, "version");
+    add("commit ", *program, "commit");
+  }
+  add("remark: ", summary, "remark");
+  return line;
+}
+
 Json summary_of(const Controller& c, const RunLabel& label) {
   const auto& cell = c.cell();
   const auto purpose = [&](hal::ShotPurpose p) { return cell.shots_taken(p); };
@@ -49,8 +69,12 @@ Json summary_of(const Controller& c, const RunLabel& label) {
   j["result"] = result_word(c);
   j["message"] = std::string{cell.why().view()};
   j["plate"] = label.plate;
+  j["cell"] = c.config().name;
+  if (!label.remark.empty()) j["remark"] = label.remark;
   j["seed"] = label.seed ? Json(*label.seed) : Json(nullptr);
   if (!label.begun.empty()) j["begun"] = label.begun;
+  j["program"] = {
+      {"version", build_info().version}, {"commit", build_info().commit}, {"build", build_info().build}};
   j["shots"] = {{"seek", purpose(hal::ShotPurpose::seek)},
                 {"boundary", purpose(hal::ShotPurpose::boundary)},
                 {"surface", purpose(hal::ShotPurpose::surface)},
@@ -126,8 +150,8 @@ std::string events_jsonl(const std::vector<hal::EventRecord>& events) {
 std::string picture(const Controller& c, const RunLabel& label, const Json& summary,
                     std::vector<PlateField> fields) {
   OverviewInput in;
-  in.title = fmt::format("Moldloft run: {} {}", label.plate,
-                         label.seed ? fmt::format("(seed {})", *label.seed) : "");
+  in.title = "Moldloft run: " + label.plate;
+  in.about = about_run(summary);
   in.subtitle =
       fmt::format("{}; {} boundary and {} surface shots, {} points used, {:.1f} s of cell time",
                   summary["result"].get<std::string>(), summary["shots"]["boundary"].get<int>(),
@@ -183,7 +207,7 @@ std::expected<void, RunError> write_results(const Controller& c, const RunFolder
   write("overview.svg", picture(c, label, summary, std::move(fields)));
   const Json timing = timing_of(c, label.conditions);
   write("timing.json", timing.dump(2) + "\n");
-  write("report.html", timing_page(timing, page_title(folder.path)));
+  write("report.html", timing_page(timing, "Timing of " + label.plate, about_run(summary)));
   write("summary.json", summary.dump(2) + "\n");
   return result;
 }

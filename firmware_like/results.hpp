@@ -28,7 +28,11 @@ struct RunLabel {
   std::optional<std::uint64_t> seed;  // of a simulated run
   std::string begun = {};             // when, UTC, as the run's store holds it; empty in a simulated run
   const RunConditions* conditions = nullptr;  // of timing.json; null: virtual time
+  std::string remark = {};                    // the operator's
 };
+
+// Plate, cell, when, by which program and the operator's remark in one line, as summary.json says it.
+std::string about_run(const Json& summary);
 
 Json summary_of(const Controller&, const RunLabel&);
 

@@ -14,6 +14,7 @@
 #include "firmware_like/control_thread.hpp"
 #include "firmware_like/display.hpp"
 #include "firmware_like/operator_channel.hpp"
+#include "firmware_like/plate_name.hpp"
 #include "firmware_like/recorder_thread.hpp"
 #include "firmware_like/service_thread.hpp"
 #include "firmware_like/timing_report.hpp"
@@ -119,6 +120,21 @@ std::uint32_t fresh_epoch() {
 // When the run began; stores of before that was kept do not know.
 std::string begun_of(const hal::RunStore& store) { return store.meta("begun").value_or(""); }
 
+std::expected<RunNames, std::string> names_given(const RunOptions& options) {
+  RunNames names;
+  if (options.plate) {
+    auto plate = one_line(*options.plate, "--plate", longest_plate_name);
+    if (!plate) return std::unexpected{plate.error()};
+    names.plate = std::move(*plate);
+  }
+  if (options.remark) {
+    auto remark = one_line(*options.remark, "--remark", longest_remark);
+    if (!remark) return std::unexpected{remark.error()};
+    names.remark = std::move(*remark);
+  }
+  return names;
+}
+
 }  // namespace
 
 int complain(std::string_view what, std::string_view program) {
@@ -144,6 +160,9 @@ std::string result_table(const Json& s, const std::string& folder) {
   const auto row = [&](std::string_view name, const std::string& value) {
     t += fmt::format("{:<28}{}\n", name, value);
   };
+  for (const char* key : {"plate", "cell", "remark"}) {
+    if (const std::string text = s.value(key, ""); !text.empty()) row(key, text);
+  }
   const auto& shots = s["shots"];
   row("shots",
       fmt::format("{} seeking, {} boundary, {} surface, {} retaken", shots["seek"].get<int>(),
@@ -186,6 +205,8 @@ int run_cell(const RunOptions& options) {
   if (options.resume_held && (options.out.empty() || options.control.empty()))
     return complain(
         "--resume-held: give the run's folder with --out, and --control: nobody could say unhold");
+  const auto names = names_given(options);
+  if (!names) return complain(names.error());
   const bool resume = options.resume || (options.resume_held && holds_run(out));
   InterruptGuard guard;
   std::optional<OperatorSocket> operator_socket;
@@ -194,7 +215,8 @@ int run_cell(const RunOptions& options) {
     if (!opened) return complain(opened.error());
     operator_socket.emplace(std::move(*opened));
   }
-  auto folder = resume ? resume_run(out, config->text) : create_run(out, config->text, RunKind::measured);
+  auto folder = resume ? resume_run(out, config->text, *names)
+                       : create_run(out, config->text, RunKind::measured, *names);
   if (!folder) return complain(folder.error().what);
 
   hal::SteadyClock clock;
@@ -233,8 +255,11 @@ int run_cell(const RunOptions& options) {
     discard_run(std::move(*folder));
     return complain(why_refused(*controller)), code == exit_aborted ? exit_failed : code;
   }
-  const RunLabel label{
-      .plate = config->name, .seed = {}, .begun = begun_of(*folder->store), .conditions = &conditions};
+  const RunLabel label{.plate = folder->names.plate,
+                       .seed = {},
+                       .begun = begun_of(*folder->store),
+                       .conditions = &conditions,
+                       .remark = folder->names.remark};
   const Json summary = summary_of(*controller, label);
   if (controller->recorder().store_failed())
     complain(
@@ -260,7 +285,8 @@ int fit_run(const FitOptions& options) {
       std::make_unique<Controller>(*config, clock, none.host(), none.host(),
                                    ControllerOptions{.archive = run->archive.get(), .devices = false});
   run_to_rest(*controller);
-  const RunLabel label{.plate = config->name, .seed = {}, .begun = begun_of(*run->store)};
+  const RunLabel label{
+      .plate = run->names.plate, .seed = {}, .begun = begun_of(*run->store), .remark = run->names.remark};
   const Json summary = summary_of(*controller, label);
   std::error_code failed;
   if (std::filesystem::equivalent(options.run, options.out, failed)) {

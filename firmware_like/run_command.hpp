@@ -2,6 +2,7 @@
 // The value returned is the program's exit code.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -29,6 +30,7 @@ struct RunOptions {
   bool resume_held = false;
   std::string control;  // path of the operator's socket; empty: none
   std::string go_on;    // the command that goes on with this run, where it is not this program's own
+  std::optional<std::string> plate, remark;  // as typed; without a name the plate has the folder's
 };
 int run_cell(const RunOptions&);
 

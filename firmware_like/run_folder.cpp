@@ -5,8 +5,10 @@
 
 #include <ctime>
 
+#include "firmware_like/build_info.hpp"
 #include "firmware_like/config.hpp"
 #include "firmware_like/flight_files.hpp"
+#include "firmware_like/plate_name.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -44,7 +46,7 @@ std::string now_utc() {
 bool holds_run(const fs::path& path) { return fs::exists(store_path(path)); }
 
 std::expected<RunFolder, RunError> create_run(const fs::path& path, const std::string& config_text,
-                                              RunKind kind) {
+                                              RunKind kind, const RunNames& names) {
   std::error_code failed;
   const bool made_folder = fs::create_directories(path, failed);
   if (failed)
@@ -60,13 +62,19 @@ std::expected<RunFolder, RunError> create_run(const fs::path& path, const std::s
   auto store = hal::RunStore::open(store_path(path), hal::RunStore::Mode::create);
   if (!store) return error(store.error().what);
   std::vector<std::pair<std::string, std::string>> about = {{"kind", kind_name(kind)},
-                                                            {"config", config_text}};
+                                                            {"config", config_text},
+                                                            {"version", std::string{build_info().version}},
+                                                            {"commit", std::string{build_info().commit}},
+                                                            {"build", std::string{build_info().build}}};
+  const RunNames kept{names.plate.empty() ? name_of_folder(path) : names.plate, names.remark};
+  about.emplace_back("plate", kept.plate);
+  if (!kept.remark.empty()) about.emplace_back("remark", kept.remark);
   // A simulated run happens at no time: its seed brings it back, byte for byte.
   if (kind == RunKind::measured) about.emplace_back("begun", now_utc());
   for (const auto& [key, value] : about) {
     if (auto written = store->set_meta(key, value); !written) return error(written.error().what);
   }
-  return RunFolder{path, std::make_unique<hal::RunStore>(std::move(*store)), nullptr, made_folder};
+  return RunFolder{path, std::make_unique<hal::RunStore>(std::move(*store)), nullptr, made_folder, kept};
 }
 
 void discard_run(RunFolder run) {
@@ -77,7 +85,8 @@ void discard_run(RunFolder run) {
   if (run.made_folder) fs::remove(run.path, not_empty);
 }
 
-std::expected<RunFolder, RunError> resume_run(const fs::path& path, const std::string& config_text) {
+std::expected<RunFolder, RunError> resume_run(const fs::path& path, const std::string& config_text,
+                                              const RunNames& names) {
   auto opened = open_run(path);
   if (!opened) return opened;
   const auto config = opened->store->meta("config");
@@ -90,8 +99,27 @@ std::expected<RunFolder, RunError> resume_run(const fs::path& path, const std::s
                     "another --out",
                     path.string(), key));
   }
+  auto& kept = opened->names;
+  if (!names.plate.empty() && names.plate != kept.plate) {
+    return error(fmt::format(
+        "{}: is the run of plate '{}', not of '{}'; resume it without --plate, or begin a new run "
+        "with another --out",
+        path.string(), kept.plate, names.plate));
+  }
+  if (!names.remark.empty() && kept.remark.find(names.remark) == kept.remark.npos) {
+    auto both = one_line(kept.remark.empty() ? names.remark : kept.remark + "; " + names.remark,
+                         "--remark, with the one that the run has", longest_remark);
+    if (!both) return error(both.error());
+    kept.remark = std::move(*both);
+  }
   auto store = hal::RunStore::open(store_path(path), hal::RunStore::Mode::append);
   if (!store) return error(store.error().what);
+  // A store of before plates had names is called by its folder from now on.
+  for (const auto& [key, value] : {std::pair{"plate", kept.plate}, std::pair{"remark", kept.remark},
+                                   std::pair{"resumed_with", version_text()}}) {
+    if (value.empty()) continue;
+    if (auto written = store->set_meta(key, value); !written) return error(written.error().what);
+  }
   // What is fitted from this run later has to have room for all of it.
   if (auto written = store->set_meta("config", config_text); !written) return error(written.error().what);
   opened->store = std::make_unique<hal::RunStore>(std::move(*store));
@@ -106,8 +134,9 @@ std::expected<RunFolder, RunError> open_run(const fs::path& path) {
   if (!store) return error(store.error().what);
   auto shots = StoredShots::load(*store);
   if (!shots) return error(shots.error().what);
+  RunNames names{store->meta("plate").value_or(name_of_folder(path)), store->meta("remark").value_or("")};
   return RunFolder{path, std::make_unique<hal::RunStore>(std::move(*store)),
-                   std::make_unique<StoredShots>(std::move(*shots))};
+                   std::make_unique<StoredShots>(std::move(*shots)), false, std::move(names)};
 }
 
 fs::path default_run_path() {

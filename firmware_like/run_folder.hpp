@@ -19,18 +19,26 @@ struct RunError {
   std::string what;
 };
 
+// What people call this run's plate, and what they say of it (plate_name.hpp).
+struct RunNames {
+  std::string plate, remark;  // empty: not given
+};
+
 struct RunFolder {
   std::filesystem::path path;
   std::unique_ptr<hal::RunStore> store;
   std::unique_ptr<StoredShots> archive;  // resumed: the shots that are there already
   bool made_folder = false;              // it was not there before
+  RunNames names = {};  // as the store holds them; a plate that has no name there has the folder's
 };
 
 enum class RunKind { measured, simulated };
 
 std::expected<RunFolder, RunError> create_run(const std::filesystem::path&, const std::string& config_text,
-                                              RunKind);
-std::expected<RunFolder, RunError> resume_run(const std::filesystem::path&, const std::string& config_text);
+                                              RunKind, const RunNames& = {});
+// Goes on under the name that the run has: another one is refused. A remark is added to the one that is there.
+std::expected<RunFolder, RunError> resume_run(const std::filesystem::path&, const std::string& config_text,
+                                              const RunNames& = {});
 std::expected<RunFolder, RunError> open_run(const std::filesystem::path&);  // to read only
 
 // Takes a run away that was refused before anything was measured, so that it does not block the next try: its

@@ -14,7 +14,7 @@
 
 namespace moldloft::firmware_like {
 
-std::string timing_page(const Json& timing, std::string_view title);
+std::string timing_page(const Json& timing, std::string_view title, std::string_view about = "");
 std::string page_title(const std::filesystem::path& folder);  // "Timing of plate-17"
 
 }  // namespace moldloft::firmware_like

@@ -8,9 +8,8 @@
 
 namespace moldloft::firmware_like {
 
-TomlSection::TomlSection(const toml::table* table, std::string name, std::string path,
-                         std::optional<std::string>& error)
-    : table_{table}, name_{std::move(name)}, path_{std::move(path)}, error_{error} {}
+TomlSection::TomlSection(const toml::table* table, std::string name, std::vector<ConfigFinding>& findings)
+    : table_{table}, name_{std::move(name)}, findings_{findings} {}
 
 const toml::node* TomlSection::node(std::string_view key) {
   known_.emplace(key);
@@ -18,9 +17,11 @@ const toml::node* TomlSection::node(std::string_view key) {
 }
 
 void TomlSection::wrong(const toml::node& at, std::string_view key, std::string_view what) {
-  if (error_) return;
   const std::string section = name_.empty() ? "" : fmt::format("[{}] ", name_);
-  error_ = fmt::format("{}:{}: {}{}: {}", path_, at.source().begin.line, section, key, what);
+  findings_.push_back({Severity::error,
+                       static_cast<int>(at.source().begin.line),
+                       fmt::format("{}{}: {}", section, key, what),
+                       {name_.empty() ? std::string{key} : fmt::format("{}.{}", name_, key)}});
 }
 
 void TomlSection::number(std::string_view key, double& value, double min, double max) {
@@ -59,6 +60,7 @@ void TomlSection::text(std::string_view key, std::string& value) {
 void TomlSection::choice(std::string_view key, std::string& value, const std::vector<std::string>& allowed) {
   const toml::node* n = node(key);
   if (n == nullptr) return;
+  if (!n->is_string()) return text(key, value);
   text(key, value);
   if (std::find(allowed.begin(), allowed.end(), value) == allowed.end()) {
     wrong(*n, key, fmt::format("'{}' is not one of: {}", value, fmt::join(allowed, ", ")));
@@ -83,7 +85,9 @@ void TomlSection::numbers(std::string_view key, std::span<double> values, double
 }
 
 void TomlSection::range(std::string_view key, std::array<double, 2>& values, double min, double max) {
+  const auto known = findings_.size();
   numbers(key, values, min, max);
+  if (findings_.size() > known) return;
   if (const toml::node* n = node(key); n != nullptr && values[0] > values[1]) {
     wrong(*n, key,
           fmt::format("from {} to {} is no range: the smaller number comes first", values[0], values[1]));
@@ -94,7 +98,7 @@ TomlSection TomlSection::section(std::string_view key) {
   const toml::node* n = node(key);
   const toml::table* table = n == nullptr ? nullptr : n->as_table();
   if (n != nullptr && table == nullptr) wrong(*n, key, "a table is wanted");
-  return {table, name_.empty() ? std::string{key} : fmt::format("{}.{}", name_, key), path_, error_};
+  return {table, name_.empty() ? std::string{key} : fmt::format("{}.{}", name_, key), findings_};
 }
 
 void TomlSection::finish() {

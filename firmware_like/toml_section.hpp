@@ -1,25 +1,26 @@
-// One table of a TOML file, read key by key: each getter notes the first thing that is wrong, finish() also
+// One table of a TOML file, read key by key: each getter notes what is wrong with its key, finish() also
 // notes keys that nobody asked for. Values keep their defaults where the key is absent.
 //
-// Setup time only: allocates. The first error of a file wins and is reported with its line.
+// Setup time only: allocates. All errors of a file are collected, each with its line and key.
 #pragma once
 
 #include <toml++/toml.h>
+
 #include <array>
-#include <optional>
 #include <set>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "firmware_like/config_rules.hpp"
+
 namespace moldloft::firmware_like {
 
 class TomlSection {
  public:
-  // `table` may be null: then every key is absent. `error` is shared by all sections of a file.
-  TomlSection(const toml::table* table, std::string name, std::string path,
-              std::optional<std::string>& error);
+  // `table` may be null: then every key is absent. `findings` is shared by all sections of a file.
+  TomlSection(const toml::table* table, std::string name, std::vector<ConfigFinding>& findings);
   ~TomlSection() = default;
 
   void number(std::string_view key, double& value, double min, double max);
@@ -39,8 +40,8 @@ class TomlSection {
   void wrong(const toml::node& at, std::string_view key, std::string_view what);
 
   const toml::table* table_;
-  std::string name_, path_;
-  std::optional<std::string>& error_;
+  std::string name_;
+  std::vector<ConfigFinding>& findings_;
   std::set<std::string, std::less<>> known_;
 };
 

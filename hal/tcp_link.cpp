@@ -195,6 +195,8 @@ class TcpLink final : public ByteLink {
 
 }  // namespace
 
+bool is_known_host(const std::string& host) { return find_address(host).has_value(); }
+
 std::unique_ptr<ByteLink> make_tcp_link(std::string host, std::uint16_t port) {
   return std::make_unique<TcpLink>(std::move(host), port);
 }

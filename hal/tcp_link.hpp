@@ -15,4 +15,7 @@ namespace moldloft::hal {
 
 std::unique_ptr<ByteLink> make_tcp_link(std::string host, std::uint16_t port);
 
+// Whether open() would find an address for this host. Blocking: reads the hosts file.
+bool is_known_host(const std::string& host);
+
 }  // namespace moldloft::hal

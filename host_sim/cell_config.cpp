@@ -38,8 +38,8 @@ std::string cell_toml(const CellDescription& d, const PlateInstance& plate, cons
   const Eigen::Vector3d axis = world_from_scanner.linear().col(0);
   const Eigen::Vector2d size = plate.plate->bounds().max - plate.plate->bounds().min;
   std::string t =
-      fmt::format("# A simulated cell: plate {}, {} arm.\nschema = 1\n\n[cell]\nname = \"{}\"\n",
-                  plate.plate->name(), d.arm == ArmKind::gantry ? "gantry" : "SCARA", plate.plate->name());
+      fmt::format("# A simulated cell with a {0} arm.\nschema = 1\n\n[cell]\nname = \"simulated {0} cell\"\n",
+                  d.arm == ArmKind::gantry ? "gantry" : "SCARA");
   t += fmt::format(
       "\n[scanner]\nhost = \"127.0.0.1\"\nport = {}\nmax_stripes = {}\nmax_points_per_stripe = {}\nfield_mm "
       "= [{}, {}]\nnoise_mm = {}\ndepth_mm = {}\n",

@@ -5,7 +5,10 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "firmware_like/build_info.hpp"
+#include "firmware_like/command_line.hpp"
 #include "firmware_like/display.hpp"
+#include "firmware_like/plate_name.hpp"
 #include "firmware_like/run_command.hpp"
 #include "host_sim/campaign.hpp"
 #include "host_sim/cell_options.hpp"
@@ -61,6 +64,20 @@ void add_cell_command(CLI::App& app, SimulatedRunOptions& options) {
   auto* command = app.add_subcommand("cell", "the whole cell in one thread: controller, cables and devices");
   add_cell_options(*command, options.cell);
   command->add_option("--out", options.out, "the run's folder; default: a new one under out/");
+  const auto add_text = [&](const char* option, std::string& text, std::size_t longest, const char* about) {
+    command->add_option_function<std::string>(
+        option,
+        [&text, option, longest](const std::string& given) {
+          const auto line = moldloft::firmware_like::one_line(given, option, longest);
+          if (!line) throw CLI::ValidationError(line.error());
+          text = *line;
+        },
+        about);
+  };
+  add_text("--name", options.name, moldloft::firmware_like::longest_plate_name,
+           "the plate's name in all results; default: its shape and seed");
+  add_text("--remark", options.remark, moldloft::firmware_like::longest_remark,
+           "one line of yours that goes into all results");
   command
       ->add_option_function<std::string>(
           "--clock", [&](const std::string& c) { options.real_time = c == "real"; },
@@ -95,7 +112,9 @@ void add_day_command(CLI::App& app, DayOptions& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"The simulated cell of Moldloft"};
+  CLI::App app{"The simulated cell of Moldloft", "moldloft-sim"};
+  app.set_version_flag("--version", "moldloft-sim " + moldloft::firmware_like::version_text(),
+                       "version, commit and compiler");
   app.require_subcommand(1);
 
   DeviceOptions devices;
@@ -133,11 +152,7 @@ int main(int argc, char** argv) {
   judged_command->add_option("folder", folder, "the run folder")->required();
   add_cell_options(*judged_command, judged);
 
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 1;
-  }
+  if (const auto ended = moldloft::firmware_like::parse_command_line(app, argc, argv)) return *ended;
   if (devices_command->parsed()) return run_devices(devices);
   if (app.got_subcommand("cell")) return cell_command(run);
   if (app.got_subcommand("campaign")) return run_campaign(campaign);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "firmware_like/plate_name.hpp"
 #include "firmware_like/run_command.hpp"
 #include "hal/cable.hpp"
 #include "host_sim/cell_config.hpp"
@@ -64,10 +65,18 @@ void run_to_rest(Controller& controller, const SimulatedCell& cell, hal::Clock& 
   if (options.on_progress) options.on_progress(controller.cell().progress());
 }
 
+// "wave, seed 1"; of a mesh the file's name without the path.
+std::string shape_and_seed(const CellDescription& cell) {
+  const bool mesh = cell.plate.ends_with(".ply");
+  return fmt::format("{}, seed {}", mesh ? firmware_like::name_of_folder(cell.plate) : cell.plate, cell.seed);
+}
+
 std::expected<firmware_like::RunFolder, firmware_like::RunError> folder_for(
     const SimulatedRunOptions& options, const std::string& text) {
-  return options.resume ? firmware_like::resume_run(options.out, text)
-                        : firmware_like::create_run(options.out, text, firmware_like::RunKind::simulated);
+  firmware_like::RunNames names{options.name, options.remark};
+  if (options.resume) return firmware_like::resume_run(options.out, text, names);
+  if (names.plate.empty()) names.plate = shape_and_seed(options.cell);
+  return firmware_like::create_run(options.out, text, firmware_like::RunKind::simulated, names);
 }
 
 }  // namespace
@@ -94,7 +103,8 @@ std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& option
                                        .attended = options.held});
   run_to_rest(*controller, {world, scanner_cable, robot_cable, *controller, *folder->store}, clock, options);
 
-  const firmware_like::RunLabel label{.plate = plate->plate->name(), .seed = options.cell.seed};
+  const firmware_like::RunLabel label{
+      .plate = folder->names.plate, .seed = options.cell.seed, .remark = folder->names.remark};
   SimulatedRun run{.summary = summary_of(*controller, label),
                    .exit_code = firmware_like::exit_code(*controller)};
   if (controller->recorder().store_failed())

@@ -32,6 +32,7 @@ struct SimulatedRunOptions {
   CellDescription cell;
   std::filesystem::path out;
   std::string config;   // the controller's cell.toml; empty: the one that fits the cell
+  std::string name = {}, remark = {};  // of the plate; empty: its shape and seed, nothing
   bool resume = false;  // goes on with the run in `out`
   bool held = false;    // comes up held, and waits for what on_tick commands
   bool write_everything =

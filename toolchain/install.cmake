@@ -1,6 +1,6 @@
 # What `cmake --install --component geometry` leaves: the geometry library for other programs, found by
 #
-#     find_package(moldloft 0.2 REQUIRED)
+#     find_package(moldloft 0.3 REQUIRED)
 #     target_link_libraries(... moldloft::geometry)        # and #include "geometry/fit/surface_fit.hpp"
 #
 # or by `pkg-config --cflags --libs moldloft-geometry`.

@@ -29,7 +29,12 @@ install(CODE "
   endif()
   file(INSTALL \"${PROJECT_SOURCE_DIR}/firmware_like/cell.example.toml\" RENAME cell.toml DESTINATION \${configuration})"
   COMPONENT controller)
-install(FILES hal/PROTOCOLS.md toolchain/TUNING.md DESTINATION ${documents}/moldloft COMPONENT controller)
+install(FILES hal/PROTOCOLS.md toolchain/TUNING.md toolchain/SECURITY.md toolchain/TROUBLESHOOTING.md
+  DESTINATION ${documents}/moldloft COMPONENT controller)
+# bash looks for a program's completion under the program's name.
+set(completions ${CMAKE_INSTALL_DATAROOTDIR}/bash-completion/completions)
+install(FILES ${package}/moldloft.bash RENAME moldloft DESTINATION ${completions} COMPONENT controller)
+install(FILES ${package}/moldloft.bash RENAME moldloft-sim DESTINATION ${completions} COMPONENT simulation)
 
 # The preloaded shim is the simulation's alone, in a folder where no other program looks for libraries.
 install(TARGETS moldloft-sim RUNTIME DESTINATION bin COMPONENT simulation)

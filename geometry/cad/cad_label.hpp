@@ -5,6 +5,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace moldloft::geometry {
 
@@ -15,6 +16,8 @@ struct CadStamp {  // UTC
 struct CadLabel {
   std::string name = "plate";    // of the product
   std::string description = {};  // one line: what it is and how exact
+  std::vector<std::string> notes =
+      {};                        // further lines of that kind, each at most 256 characters (STEP's limit)
   std::string file_name = {};    // as the file is called, without its folder
   std::string system = "Moldloft";
   std::string author = {}, organization = {};

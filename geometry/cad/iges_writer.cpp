@@ -224,9 +224,13 @@ Section global(const TrimmedSurface& face, const CadLabel& label) {
 
 Section start(const CadLabel& label) {
   Section section('S');
-  std::string text = iges_string(label.name + ": " + label.description);
-  text.erase(0, text.find('H') + 1);  // the start section is prose
-  for (std::size_t at = 0; at < text.size(); at += line_columns) section.add(text.substr(at, line_columns));
+  const auto add = [&](const std::string& line) {
+    std::string text = iges_string(line);
+    text.erase(0, text.find('H') + 1);  // the start section is prose
+    for (std::size_t at = 0; at < text.size(); at += line_columns) section.add(text.substr(at, line_columns));
+  };
+  add(label.name + ": " + label.description);
+  for (const std::string& note : label.notes) add(note);
   return section;
 }
 

@@ -187,7 +187,9 @@ std::string iso_time(const CadStamp& s) {
 
 std::string header(const CadLabel& label) {
   std::string text = "ISO-10303-21;\nHEADER;\n";
-  append_wrapped(text, "FILE_DESCRIPTION((" + step_string(label.description) + "),'2;1');");
+  std::string about = step_string(label.description);
+  for (const std::string& note : label.notes) about += "," + step_string(note);
+  append_wrapped(text, "FILE_DESCRIPTION((" + about + "),'2;1');");
   append_wrapped(text, "FILE_NAME(" + step_string(label.file_name) + ",'" + iso_time(label.stamp) + "',(" +
                            step_string(label.author) + "),(" + step_string(label.organization) + ")," +
                            step_string(label.system) + "," + step_string(label.system) + ",'');");

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bench/benchmark.hpp"
+#include "firmware_like/build_info.hpp"
 
 namespace moldloft::bench {
 
@@ -37,6 +38,8 @@ std::span<const Benchmark> all_benchmarks() {
 int main(int argc, char** argv) {
   using namespace moldloft::bench;
   CLI::App app{"Speeds side by side with peers and limits, one run"};
+  app.set_version_flag("--version", "moldloft-bench " + moldloft::firmware_like::version_text(),
+                       "version, commit and compiler");
   app.require_subcommand(1);
   Options options;
   bool json = false;

@@ -80,8 +80,28 @@ TEST_CASE("CAD files say the plate, the unit, the noise, the tolerance and when 
   CHECK(iges.find("15H20261125.070809,") != iges.npos);
 }
 
+TEST_CASE("CAD files say cell, remark and the program that measured, each in its place") {
+  Json told = summary;
+  told["cell"] = "loft";
+  told["remark"] = "it's cold";
+  told["program"] = {{"version", "1.2.3"}, {"commit", "0123456789ab"}, {"build", "Debug"}};
+  const CadFacts facts = cad_facts(told);
+  const std::string step = step_file(small_surface(), facts, "s.step").value();
+  CHECK(step.find("'cell: loft'") != step.npos);
+  CHECK(step.find("'remark: it''s cold'") != step.npos);
+  CHECK(step.find("'Moldloft 1.2.3 (commit 0123456789ab; Debug)'") != step.npos);
+  const std::string iges = iges_file(small_surface(), facts, "s.igs").value();
+  CHECK(iges.find("\ncell: loft ") != iges.npos);
+  CHECK(iges.find("\nremark: it's cold ") != iges.npos);
+  CHECK(iges.find("Moldloft 1.2.3 (commit") != iges.npos);
+}
+
 TEST_CASE("what a summary does not say is left out, and a time that is none is the fixed one") {
-  const CadFacts facts = cad_facts(Json{{"plate", 7}, {"begun", "yesterday"}, {"surface", "none"}});
+  const CadFacts facts = cad_facts(Json{{"plate", 7},
+                                        {"begun", "yesterday"},
+                                        {"surface", "none"},
+                                        {"program", {{"version", 3}}},
+                                        {"remark", nullptr}});
   CHECK(facts.plate == "measured");
   const std::string step = step_file(small_surface(), facts, "s.step").value();
   CHECK(step.find("'1970-01-01T00:00:00Z'") != step.npos);

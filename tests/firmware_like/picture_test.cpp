@@ -142,15 +142,28 @@ TEST_CASE("a run that was held before it had a surface shows its edge points and
   CHECK(svg.find("nan") == std::string::npos);
 }
 
-TEST_CASE("a plate that is a file is called by the file's name alone, and no name breaks the picture") {
+TEST_CASE("a plate's name stands in the picture as it was given, and no name breaks it") {
   const auto surface = plate(300, 300);
   const auto title = [&](const char* text) {
     auto in = input(surface, 1);
     in.title = text;
     return Paper{overview_svg(in)}.texts.front().words;
   };
-  CHECK(title("Moldloft run: ../data/scans/panel.ply (seed 1)") == "Moldloft run: panel.ply (seed 1)");
-  CHECK(title("Moldloft run: /data/left wing/panel.ply ") == "Moldloft run: panel.ply ");
-  CHECK(title("Moldloft run: saddle (seed 1)") == "Moldloft run: saddle (seed 1)");
+  CHECK(title("Moldloft run: Hull 7/plate 12") == "Moldloft run: Hull 7/plate 12");
   CHECK(title("Moldloft run: a<b>&c") == "Moldloft run: a&lt;b&gt;&amp;c");
+}
+
+TEST_CASE("whose run it is stands under the title, and is cut where it would leave the picture") {
+  const auto surface = plate(300, 300);
+  auto in = input(surface, 1);
+  in.about = "plate 17; cell loft; remark: a < b";
+  const std::string svg = overview_svg(in);
+  check_order(Paper{svg});
+  CHECK(svg.find("plate 17; cell loft; remark: a &lt; b<") != std::string::npos);
+  in.about = "plate ";
+  for (int i = 0; i < 200; ++i) in.about += "\xC3\x9F";  // two bytes a letter
+  const std::string cut = overview_svg(in);
+  check_order(Paper{cut});
+  CHECK(cut.find("\xC3\x9F...<") != std::string::npos);
+  CHECK(cut.find("\xC3...") == std::string::npos);
 }

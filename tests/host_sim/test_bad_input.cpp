@@ -71,8 +71,10 @@ TEST_CASE("a configuration that is wrong is refused with file and line, and no r
 }
 
 TEST_CASE("a configuration that is not there is refused by its path") {
-  check_refused(run_program({MOLDLOFT, "run", "/nowhere/cell.toml"}),
-                "moldloft: /nowhere/cell.toml: cannot be read; give the path of a cell configuration");
+  check_refused(
+      run_program({MOLDLOFT, "run", "/nowhere/cell.toml"}),
+      "moldloft: /nowhere/cell.toml: cannot be read: No such file or directory; give the path of a cell "
+      "configuration");
 }
 
 TEST_CASE("no scanner server: one line after the configured time, and the folder is free for the next try") {
@@ -200,7 +202,8 @@ TEST_CASE("a latency self-test that cannot be is refused in one line before anyt
   refuses({"--tick", "100001"}, "--tick: 100001 us given; from " + shortest + " to 100000 us");
   refuses({"--tick", "-1"}, "--tick: -1 us given; from " + shortest + " to 100000 us");
   refuses({"--config", bench.path("none.toml")},
-          bench.path("none.toml") + ": cannot be read; give the path of a cell configuration");
+          bench.path("none.toml") +
+              ": cannot be read: No such file or directory; give the path of a cell configuration");
   const std::string held = bench.write("held", "a file");
   const auto in_the_way = run_program({MOLDLOFT, "latency", "--duration", "1", "--out", held + "/x"});
   CHECK(in_the_way.exit_code == firmware_like::exit_failed);

@@ -225,7 +225,7 @@ TEST_CASE(
                        PTY_MODEM};
   CHECK(refused.wait(run_limit) == firmware_like::exit_failed);
   CHECK(lines_in(refused.err()) == 1);
-  CHECK(refused.err().starts_with("moldloft: target outside the workspace: x "));
+  CHECK(refused.err().find(": [start] centre_mm: target outside the workspace: x ") != std::string::npos);
   CHECK_FALSE(std::filesystem::exists(never));
 }
 

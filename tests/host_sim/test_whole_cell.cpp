@@ -1,6 +1,7 @@
 // The whole cell under virtual time: controller, cables, devices, plate; nothing goes wrong here.
 #include <doctest/doctest.h>
 
+#include "firmware_like/build_info.hpp"
 #include "firmware_like/export_command.hpp"
 #include "firmware_like/run_command.hpp"
 #include "host_sim/day.hpp"
@@ -17,7 +18,11 @@ TEST_CASE("the default run completes, and its summary says everything that it pr
   CHECK(run.exit_code == firmware_like::exit_done);
   CHECK(s["schema"] == 1);
   CHECK(s["result"] == "complete");
-  CHECK(s["plate"].get<std::string>().find("saddle") != std::string::npos);
+  CHECK(s["plate"] == "saddle, seed 1");
+  CHECK(s["cell"] == "simulated SCARA cell");
+  CHECK(s["program"]["version"] == firmware_like::build_info().version);
+  CHECK(s["program"]["commit"] == firmware_like::build_info().commit);
+  CHECK_FALSE(s.contains("remark"));
   CHECK(s["seed"] == 1);
   CHECK(s["shots"]["boundary"].get<int>() >= 10);
   CHECK(s["shots"]["surface"].get<int>() ==

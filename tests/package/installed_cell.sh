@@ -39,9 +39,11 @@ holds() { # PACKAGE FILE...
   for file in "$@"; do grep -qxF "./$file" "$scratch/files" || fail "${of##*/} lacks $file"; done
 }
 holds "$package" etc/moldloft/cell.toml usr/bin/moldloft usr/lib/systemd/system/moldloft@.service usr/lib/sysusers.d/moldloft.conf \
-  usr/lib/udev/rules.d/60-moldloft.rules usr/share/doc/moldloft/{PROTOCOLS.md,TUNING.md,changelog.gz,copyright} usr/share/man/man1/moldloft.1.gz
+  usr/lib/udev/rules.d/60-moldloft.rules usr/share/doc/moldloft/{PROTOCOLS.md,SECURITY.md,TROUBLESHOOTING.md,TUNING.md,changelog.gz,copyright} \
+  usr/share/man/man1/moldloft.1.gz usr/share/bash-completion/completions/moldloft
 holds "$simulation" usr/bin/moldloft-sim usr/bin/moldloft-rehearse usr/lib/moldloft/libpty_modem.so \
-  usr/share/doc/moldloft-sim/{changelog.gz,copyright} usr/share/man/man1/moldloft-rehearse.1.gz
+  usr/share/doc/moldloft-sim/{changelog.gz,copyright} usr/share/man/man1/{moldloft-rehearse,moldloft-sim}.1.gz \
+  usr/share/bash-completion/completions/moldloft-sim
 holds "$geometry" usr/lib/libmoldloft_geometry.a usr/include/moldloft/geometry/fit/surface_fit.hpp usr/lib/cmake/moldloft/moldloft-config.cmake
 # What simulates is in no package of the controller, and no file is in two packages.
 ! files_of "$package" | grep -E 'pty_modem|moldloft-(sim|rehearse)|\.a$|\.hpp$' || fail "the controller's package holds what is not the controller's"
