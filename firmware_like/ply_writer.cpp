@@ -24,12 +24,14 @@ std::string points_ply(const std::vector<MeasuredPoint>& points) {
       "ply\nformat binary_little_endian 1.0\ncomment moldloft, registered points of the surface "
       "shots\ncomment unit mm\n"
       "comment frame world\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
-      "property float residual\nproperty ushort shot\nproperty ushort stripe\nend_header\n",
+      "property float quality\nproperty float scalar_residual\nproperty ushort scalar_shot\n"
+      "property ushort scalar_stripe\nend_header\n",
       points.size());
-  out.reserve(out.size() + points.size() * 20);
+  out.reserve(out.size() + points.size() * 24);
   for (const auto& p : points) {
     for (int axis = 0; axis < 3; ++axis) put(out, p.position[axis]);
-    put(out, p.residual_mm);
+    put(out, p.residual_mm);  // as quality
+    put(out, p.residual_mm);  // as scalar_residual
     put(out, p.shot);
     put(out, p.stripe);
   }

@@ -9,6 +9,8 @@
 
 namespace moldloft::firmware_like {
 
+// The residual stands twice, under the names by which the two viewers most used find what is to be coloured: MeshLab
+// takes `quality`, CloudCompare what begins with `scalar_` (and offers shot and stripe as well).
 std::string points_ply(const std::vector<MeasuredPoint>&);
 
 // The surface's border as a closed line of vertices and edges, counter-clockwise.

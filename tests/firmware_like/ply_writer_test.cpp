@@ -2,6 +2,8 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cstring>
 #include <map>
 #include <sstream>
@@ -123,10 +125,39 @@ TEST_CASE("points come back as they were, with unit and frame in the header") {
     CHECK(rows[i].at("x") == static_cast<double>(points[i].position.x()));
     CHECK(rows[i].at("y") == static_cast<double>(points[i].position.y()));
     CHECK(rows[i].at("z") == static_cast<double>(points[i].position.z()));
-    CHECK(rows[i].at("residual") == static_cast<double>(points[i].residual_mm));
-    CHECK(rows[i].at("shot") == points[i].shot);
-    CHECK(rows[i].at("stripe") == points[i].stripe);
+    CHECK(rows[i].at("scalar_residual") == static_cast<double>(points[i].residual_mm));
+    CHECK(rows[i].at("scalar_shot") == points[i].shot);
+    CHECK(rows[i].at("scalar_stripe") == points[i].stripe);
   }
+}
+
+// CloudCompare (PlyFilter) makes a scalar field of every vertex property with "SCAL" in its name and takes the first
+// that ends with x, y, z for the coordinates; MeshLab (vcglib's import_ply) colours by the float property `quality`.
+TEST_CASE("CloudCompare and MeshLab find the residuals as what is to be coloured") {
+  const std::vector<MeasuredPoint> points = {
+      {.position = {1, 2, 3}, .residual_mm = 0.25f, .shot = 1, .stripe = 2, .u = 0, .v = 0}};
+  const auto ply = read(points_ply(points));
+  const auto& vertex = ply.element("vertex");
+  std::vector<std::string> coordinates, fields, quality, unknown;
+  for (const auto& p : vertex.properties) {
+    std::string name = p.name;
+    std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::toupper(c); });
+    if (name.find("SCAL") != std::string::npos)
+      fields.push_back(p.name);
+    else if (p.name == "quality" && p.type == "float")
+      quality.push_back(p.name);
+    else if (name.ends_with("X") || name.ends_with("Y") || name.ends_with("Z"))
+      coordinates.push_back(p.name);
+    else
+      unknown.push_back(p.name);
+  }
+  CHECK(coordinates == std::vector<std::string>{"x", "y", "z"});
+  REQUIRE(!fields.empty());
+  CHECK(fields.front() == "scalar_residual");  // the first is the one shown
+  CHECK(fields.size() == 3);
+  CHECK(quality.size() == 1);
+  CHECK(unknown.empty());
+  CHECK(vertex.rows[0].at("quality") == 0.25);
 }
 
 TEST_CASE("no points are a file too") {
