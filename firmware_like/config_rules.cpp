@@ -106,23 +106,32 @@ MaybeFinding reach(const CellConfig& c) {
   return {};
 }
 
-MaybeFinding start_place(const CellConfig& c) {
+// Where the tip has to stand to look at the start with the head turned so.
+MaybeFinding start_outside(const CellConfig& c, double head_yaw) {
   const auto& w = c.robot.workspace;
-  const hal::Pose tip = tasks::tip_pose_for(c.start, c.scanner.tip_from_scanner);
+  tasks::ShotPlace place = c.start;
+  place.head_yaw = head_yaw;
+  const hal::Pose tip = tasks::tip_pose_for(place, c.scanner.tip_from_scanner);
   const auto look = [&](const char* key, const char* what, double value,
                         const tasks::Range& range) -> MaybeFinding {
     if (range.contains(value)) return {};
-    return error(
-        {"start.centre_mm", std::string{"robot.workspace."} + key, "scanner.mount.translation_mm",
-         "scanner.mount.zyz_deg"},
-        fmt::format("[start] centre_mm: target outside the workspace: {} {:.1f} mm of the tip that looks "
-                    "there, limit {:.1f} to {:.1f} mm ([robot.workspace] {})",
-                    what, value, range.min, range.max, key));
+    return error({"start.centre_mm", std::string{"robot.workspace."} + key, "scanner.mount.translation_mm",
+                  "scanner.mount.zyz_deg"},
+                 fmt::format("[start] centre_mm: target outside the workspace: {} {:.1f} mm of the tip that "
+                             "looks there, limit {:.1f} to {:.1f} mm ([robot.workspace] {})",
+                             what, value, range.min, range.max, key));
   };
   if (auto no = look("x_mm", "x", tip.x_mm, w.x_mm)) return no;
   if (auto no = look("y_mm", "y", tip.y_mm, w.y_mm)) return no;
   if (auto no = look("z_mm", "z", tip.z_mm, w.z_mm)) return no;
   return look("reach_mm", "reach", std::hypot(tip.x_mm, tip.y_mm), w.reach_mm);
+}
+
+// The cell takes the same stripes with the head turned by half a turn where only that is within reach.
+MaybeFinding start_place(const CellConfig& c) {
+  auto no = start_outside(c, c.start.head_yaw);
+  return no && start_outside(c, geometry::wrapped_angle(c.start.head_yaw + 180 * hal::degree)) ? no
+                                                                                               : std::nullopt;
 }
 
 // What lies lower than half a thickness over the table is the table.

@@ -113,6 +113,13 @@ TEST_CASE("values that look like a slip are warnings, and a run takes them") {
   warns("[fit]\nfinest_span_mm = 100\n", "2 [fit] finest_span_mm: 100");
 }
 
+TEST_CASE("a start that only the head's opposite heading can look at is none outside the workspace") {
+  CHECK(told("[robot.workspace]\ny_mm = [-800, 50]\n").empty());  // the tip at y -140 instead of 140
+  CHECK(told("[robot.workspace]\ny_mm = [-50, 50]\n")
+            .front()
+            .starts_with("error 2 [start] centre_mm: target outside the workspace: y 140.0 mm"));
+}
+
 TEST_CASE("a mount that is only tilted is none in radians") {
   CHECK(told("[scanner.mount]\nzyz_deg = [3, 178, 182]\n").empty());
   CHECK(told("[scanner.mount]\nzyz_deg = [180, 180, 0]\n[start]\ncentre_mm = [500, 100, 10]\n").empty());

@@ -47,7 +47,7 @@ TEST_CASE("an option that is misspelt or given twice and a word too many are tol
              "moldloft-sim cell: --seed is given 2 times; give it once");
   check_line({MOLDLOFT, "run", "cell.toml", "--n\xE9\n"},
              "moldloft run: '--n"
-             "??' is no option here");
+             "\?\?' is no option here");
 }
 
 TEST_CASE("both programs say their version, commit and compiler") {
