@@ -3,10 +3,8 @@
 #     toolchain/package.sh                    # sets up, builds, and leaves them in build/release/
 #     (cd build/release && cpack)             # the last step alone; before it: cmake --build --preset release --target packaged
 #
-# | component  | package                 | what it is for                                                        |
-# | controller | moldloft                | the cell's computer                                                   |
-# | simulation | moldloft-sim            | rehearsing there: simulated devices for the installed controller      |
-# | geometry   | libmoldloft-geometry-dev | programs of others, install.cmake                                    |
+# Component `controller` is the package moldloft, for the cell's computer; `simulation` is moldloft-sim, simulated devices for a
+# rehearsal there; `geometry` is libmoldloft-geometry-dev, for programs of others (install.cmake).
 #
 # Included at the end of the top CMakeLists.txt.
 set(package ${PROJECT_SOURCE_DIR}/toolchain/package)
@@ -82,7 +80,7 @@ set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "controller of a cell that measures formed ship plates")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # each package's own is the first line of its description
 
 set(CPACK_DEBIAN_CONTROLLER_PACKAGE_NAME moldloft)
 set(CPACK_DEBIAN_CONTROLLER_PACKAGE_SECTION science)
@@ -90,7 +88,8 @@ set(CPACK_DEBIAN_CONTROLLER_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_CONTROLLER_PACKAGE_RECOMMENDS "systemd")
 set(CPACK_DEBIAN_CONTROLLER_PACKAGE_SUGGESTS "moldloft-sim")
 set(CPACK_COMPONENT_CONTROLLER_DESCRIPTION
-"A robot carries a laser-stripe scanner to a plate, finds its edge, walks
+"controller of a cell that measures formed ship plates
+A robot carries a laser-stripe scanner to a plate, finds its edge, walks
 round it and sweeps it; the result is the outline and the surface as one
 B-spline, also as STEP and IGES, with the timing of the run.
 
@@ -104,7 +103,8 @@ set(CPACK_DEBIAN_SIMULATION_PACKAGE_NAME moldloft-sim)
 set(CPACK_DEBIAN_SIMULATION_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_SIMULATION_PACKAGE_DEPENDS "moldloft (= ${PROJECT_VERSION})")
 set(CPACK_COMPONENT_SIMULATION_DESCRIPTION
-"Simulated devices for a rehearsal on the computer of the cell: a scanner
+"simulated devices for the controller moldloft
+Simulated devices for a rehearsal on the computer of the cell: a scanner
 on loopback TCP and a robot on a pseudo-terminal, served in real time to
 the installed controller. moldloft-rehearse measures one simulated plate
 and says how far the result is from the truth.")
@@ -114,7 +114,8 @@ set(CPACK_DEBIAN_GEOMETRY_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_GEOMETRY_PACKAGE_SHLIBDEPS OFF)  # headers and a static library: what it needs is needed when one compiles
 set(CPACK_DEBIAN_GEOMETRY_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4)")
 set(CPACK_COMPONENT_GEOMETRY_DESCRIPTION
-"Splines, edges of stripes, surface fits, inspection, STEP and IGES, for
+"splines, fits and CAD files of measured plates, for programs
+Splines, edges of stripes, surface fits, inspection, STEP and IGES, for
 programs in C++23: a static library with headers that leans on Eigen alone,
 found with find_package(moldloft).")
 include(CPack)

@@ -58,7 +58,7 @@ trap end EXIT
 # The distribution's own kernel, taken out of its package; nothing is installed on this machine.
 kernel_of_the_distribution() {
   local package
-  package=$(apt-cache depends "$kernel_package" 2>/dev/null | sed -n 's/^ *Depends: \(linux-image-[0-9].*-amd64\)$/\1/p' | head -1)
+  package=$(LC_ALL=C apt-cache depends "$kernel_package" 2>/dev/null | sed -n 's/^ *Depends: \(linux-image-[0-9].*-amd64\)$/\1/p' | head -1)
   [ -n "$package" ] || cannot "apt knows no $kernel_package; is its list of packages there (apt-get update)?"
   kernel=build/cell-pc/$package/vmlinuz
   [ -f "$kernel" ] && return
