@@ -95,7 +95,7 @@ grep -qx 'deploy: done' "$cache/deploy.log" || { tail -30 "$cache/deploy.log" >&
 compiler() { dpkg-query "$@" -W -f='${Version}' g++-12 libc6-dev libstdc++-12-dev libeigen3-dev nlohmann-json3-dev libcli11-dev 2>/dev/null; }
 if [ -z "$committed" ]; then
   echo "deploy: not all is committed, so the packages of the two builds were not compared"
-elif grep -q '^CMAKE_BUILD_TYPE:STRING=Release' "$build/CMakeCache.txt" && [ "$(compiler)" = "$(compiler --admindir="$root/var/lib/dpkg")" ]; then
+elif grep -q -e -ffile-prefix-map "$build/compile_commands.json" && [ "$(compiler)" = "$(compiler --admindir="$root/var/lib/dpkg")" ]; then
   rm -rf "$cache/here"
   (cd "$build" && cpack --config CPackConfig.cmake -B "$cache/here") >/dev/null
   for package in "$cache"/here/*.deb; do
@@ -103,5 +103,5 @@ elif grep -q '^CMAKE_BUILD_TYPE:STRING=Release' "$build/CMakeCache.txt" && [ "$(
   done
   echo "deploy: built twice, in two folders: the same $(ls "$cache/here" | grep -c deb$) packages"
 else
-  echo "deploy: this machine has another compiler than the clean root: the packages of the two builds were not compared"
+  echo "deploy: the packages were not compared: another compiler, or a build that holds its own path"
 fi

@@ -62,7 +62,8 @@ systemctl start $unit
 wait_until 20 state_is Held
 echo '# edited by hand' >>/etc/moldloft/cell.toml
 apt-get remove -qq moldloft-sim >/dev/null 2>&1 || fail "moldloft-sim is not removed"
-[ -z "$(dpkg -L moldloft-sim 2>/dev/null)" ] || fail "moldloft-sim leaves $(dpkg -L moldloft-sim)"
+left=$(find /usr -xdev -name 'moldloft-sim*' -o -xdev -name 'moldloft-rehearse*' -o -xdev -name 'libpty_modem*')
+[ -z "$left" ] || fail "moldloft-sim leaves $left"
 dpkg-deb -R /home/newcomer/moldloft/build/release/moldloft_*.deb /newer
 sed -i 's/^Version: .*/&+next/' /newer/DEBIAN/control
 echo '# of the next version' >>/newer/etc/moldloft/cell.toml
@@ -80,7 +81,7 @@ apt-get remove -qq moldloft >/dev/null 2>&1 || fail "moldloft is not removed"
 grep -q '"result": "stopped"' /var/lib/moldloft/plate-18/summary.json || fail "the plate of a removed package is not stopped and saved"
 [ -f /etc/moldloft/cell.toml ] || fail "a removal takes the configuration along"
 kill $devices; wait $devices || true
-apt-get purge -qq moldloft >/purged 2>&1 || fail "moldloft is not purged"
+apt-get purge -qq moldloft moldloft-sim >/purged 2>&1 || fail "moldloft is not purged"
 grep -q 'plates stay in /var/lib/moldloft' /purged || { cat /purged; fail "purge does not say what stays"; }
 rm -r /etc/systemd/system/moldloft@.service.d
 left=$(find /etc /usr /var /run -xdev -iname '*moldloft*' -not -path '/var/lib/moldloft*' -not -path '/var/lib/systemd/*' -not -path '/var/log/*' | sort)
