@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
+#include <vector>
 
 #include "host_sim/plan_polygon.hpp"
 
@@ -14,6 +17,7 @@ namespace {
 
 constexpr double field_over_table_mm = 15;
 constexpr double look_beyond_mm = 20;   // a tracker's field of view hangs over the edge
+constexpr double nearest_places_mm = 5;
 constexpr double field_radius_mm = 75;  // the field's corners are 72 mm from its centre
 
 Eigen::Vector2d middle_of(const CellDescription& cell) {
@@ -22,9 +26,11 @@ Eigen::Vector2d middle_of(const CellDescription& cell) {
 }
 
 std::expected<std::shared_ptr<const Plate>, SimError> plate_of(const CellDescription& cell) {
-  if (cell.plate.ends_with(".ply")) return read_mesh_plate(cell.plate, cell.unit, cell.thickness_mm);
+  if (is_mesh(cell)) {
+    return read_mesh_plate(cell.plate, cell.unit.value_or(LengthUnit::millimetre), cell.thickness_mm);
+  }
   const auto shape = shape_named(cell.plate);
-  if (!shape) return std::unexpected(SimError{shape.error().what + ", or a file that ends in .ply"});
+  if (!shape) return std::unexpected(SimError{shape.error().what + ", or give the path of a PLY or STL file"});
   return make_plate({*shape, outline_corners(cell.outline, cell.sizes), cell.thickness_mm, cell.amplitude_mm,
                      cell.radius_mm});
 }
@@ -35,10 +41,20 @@ PlateInstance put_down(const std::shared_ptr<const Plate>& plate, const Placemen
   return resting_on_table(plate, place.x_mm - turned.x(), place.y_mm - turned.y(), place.turn);
 }
 
-bool in_reach(const CellDescription& cell, const Arm& arm, const PlateInstance& plate) {
+// Points of the outline where the arm is asked whether it reaches: a ragged border of a scan is asked every few
+// millimetres, not at each of its thousands of vertices.
+std::vector<Eigen::Vector2d> places_along(PlanPoints outline) {
+  std::vector<Eigen::Vector2d> places;
+  for (const auto& p : sampled_outline(outline, 25.0)) {
+    if (places.empty() || (p - places.back()).norm() >= nearest_places_mm) places.push_back(p);
+  }
+  return places;
+}
+
+bool in_reach(const CellDescription& cell, const Arm& arm, const PlateInstance& plate, PlanPoints places) {
   const double z = plate.z_mm;
   const Eigen::Vector2d middle = plate.to_world(centroid(plate.plate->outline()));
-  for (const auto& p : sampled_outline(plate.plate->outline(), 25.0)) {
+  for (const auto& p : places) {
     Eigen::Vector2d w = plate.to_world(p);
     w += look_beyond_mm * (w - middle).normalized();
     for (double heading = 0; heading < std::numbers::pi; heading += 15 * hal::degree) {
@@ -73,6 +89,15 @@ geometry::RigidMotion nominal_mount() {
   return mount;
 }
 
+bool is_mesh(const CellDescription& cell) {
+  if (shape_named(cell.plate)) return false;
+  std::string name = cell.plate;
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::error_code unknown;
+  return name.find('/') != name.npos || name.ends_with(".ply") || name.ends_with(".stl") ||
+         std::filesystem::exists(cell.plate, unknown);
+}
+
 std::unique_ptr<Arm> make_arm(const CellDescription& cell) {
   return cell.arm == ArmKind::scara ? make_scara(cell.scara) : make_gantry(cell.gantry);
 }
@@ -91,6 +116,7 @@ std::expected<PlateInstance, SimError> placed_plate(const CellDescription& cell)
   const auto plate = plate_of(cell);
   if (!plate) return std::unexpected(plate.error());
   const auto arm = make_arm(cell);
+  const auto places = places_along((*plate)->outline());
   const auto no_place = [&] {
     return SimError{
         fmt::format("plate '{}' ({:.0f} x {:.0f} mm) does not fit under the {} arm: choose a smaller plate, "
@@ -100,7 +126,7 @@ std::expected<PlateInstance, SimError> placed_plate(const CellDescription& cell)
   };
   if (cell.placement) {
     const auto instance = put_down(*plate, *cell.placement);
-    if (!in_reach(cell, *arm, instance)) return std::unexpected(no_place());
+    if (!in_reach(cell, *arm, instance, places)) return std::unexpected(no_place());
     return instance;
   }
   const Eigen::Vector2d middle = middle_of(cell);
@@ -111,7 +137,7 @@ std::expected<PlateInstance, SimError> placed_plate(const CellDescription& cell)
     if (shift.norm() > room) shift *= room / shift.norm();
     const double turn = random.uniform(-std::numbers::pi, std::numbers::pi);
     const auto instance = put_down(*plate, {middle.x() + shift.x(), middle.y() + shift.y(), turn});
-    if (in_reach(cell, *arm, instance)) return instance;
+    if (in_reach(cell, *arm, instance, places)) return instance;
   }
   return std::unexpected(no_place());
 }

@@ -36,8 +36,8 @@ struct Placement {
 };
 
 struct CellDescription {
-  std::string plate = "saddle";              // a shape's name, or a file that ends in .ply
-  LengthUnit unit = LengthUnit::millimetre;  // of that file
+  std::string plate = "saddle";    // a shape's name, or the path of a mesh file
+  std::optional<LengthUnit> unit;  // of that file; millimetres unless given
   OutlineKind outline = OutlineKind::square;
   OutlineSizes sizes;
   double thickness_mm = 6, amplitude_mm = 10, radius_mm = 1000;
@@ -54,6 +54,9 @@ struct CellDescription {
 
   std::uint64_t seed = 1;
 };
+
+// Whether the plate is a mesh file: its word is no shape's, and there is such a file or the word looks like one.
+bool is_mesh(const CellDescription&);
 
 std::unique_ptr<Arm> make_arm(const CellDescription&);
 

@@ -20,18 +20,25 @@ CLI::Option* add_named(CLI::App& command, const std::string& name, Value& value,
       about);
 }
 
-std::expected<LengthUnit, SimError> unit_named(std::string_view name) {
-  if (name == "mm") return LengthUnit::millimetre;
-  if (name == "m") return LengthUnit::metre;
-  return std::unexpected(SimError{"no unit is called '" + std::string(name) + "': choose mm or m"});
+// Options that say what a plate is not asked for: a mesh has its own outline, a formula its own unit.
+void refuse_contradictions(const CLI::App& command, const CellDescription& cell) {
+  if (!is_mesh(cell)) {
+    if (command.count("--unit") > 0)
+      throw CLI::ValidationError("--unit", "is for mesh files; the plate '" + cell.plate + "' is a formula in mm");
+    return;
+  }
+  for (const char* option : {"--outline", "--width", "--depth", "--top-width", "--shear", "--amplitude", "--radius"}) {
+    if (command.count(option) > 0)
+      throw CLI::ValidationError(option, "is for plates by formula; the mesh " + cell.plate + " has its own shape");
+  }
 }
 
 }  // namespace
 
 void add_cell_options(CLI::App& command, CellDescription& cell) {
-  command.add_option("--plate", cell.plate, "flat, cylinder, saddle, twist, dome, wave, or a mesh FILE.ply")
+  command.add_option("--plate", cell.plate, "flat, cylinder, saddle, twist, dome, wave, or a mesh: FILE.ply, FILE.stl")
       ->capture_default_str();
-  add_named(command, "--unit", cell.unit, unit_named, "unit of the mesh file: mm (default) or m");
+  add_named(command, "--unit", cell.unit, unit_named, "unit of the mesh file: mm (default), cm, m or inch");
   add_named(command, "--outline", cell.outline, outline_named,
             "square (default), rectangle, trapezoid or parallelogram");
   command.add_option("--width", cell.sizes.width_mm, "lower side, mm")->check(CLI::PositiveNumber);
@@ -45,6 +52,7 @@ void add_cell_options(CLI::App& command, CellDescription& cell) {
   command.add_option("--radius", cell.radius_mm, "of the cylinder, mm")->capture_default_str();
   add_named(command, "--arm", cell.arm, arm_named, "scara (default) or gantry");
   command.add_option("--seed", cell.seed, "draws placement, noise and errors")->capture_default_str();
+  command.parse_complete_callback([&command, &cell] { refuse_contradictions(command, cell); });
 }
 
 }  // namespace moldloft::host_sim

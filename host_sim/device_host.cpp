@@ -79,6 +79,8 @@ class DeviceLog {
 int run_devices(const DeviceOptions& options) {
   const auto plate = placed_plate(options.cell);
   if (!plate) return failed(plate.error());
+  if (const auto& remarks = plate->plate->remarks(); !remarks.empty())
+    fmt::print(stderr, "plate {}: {}\n", plate->plate->name(), remarks);
   auto scanner = TcpServerLink::listen_on(options.scanner_port);
   if (!scanner) return failed(scanner.error());
   const std::uint16_t scanner_port = (*scanner)->port();

@@ -21,8 +21,15 @@ using namespace moldloft::host_sim;
 
 namespace {
 
+// What was read of a mesh, and what was repaired of it.
+void say_remarks(const PlateInstance& place) {
+  const auto& remarks = place.plate->remarks();
+  if (!remarks.empty()) fmt::print(stderr, "plate {}: {}\n", place.plate->name(), remarks);
+}
+
 int judge_command(const std::string& folder, const CellDescription& cell) {
   const auto plate = placed_plate(cell);
+  if (plate) say_remarks(*plate);
   const auto verdict = plate ? judge_run(folder, *plate) : std::unexpected(plate.error());
   if (!verdict) {
     fmt::print(stderr, "moldloft-sim judge: {}\n", verdict.error().what);
@@ -38,6 +45,7 @@ int judge_command(const std::string& folder, const CellDescription& cell) {
 
 int cell_command(SimulatedRunOptions& options) {
   if (options.out.empty()) options.out = moldloft::firmware_like::default_run_path();
+  options.on_plate = say_remarks;
   const bool terminal = isatty(STDERR_FILENO) != 0;
   if (terminal) {
     options.on_progress = [](const moldloft::tasks::CellProgress& p) {

@@ -82,24 +82,24 @@ std::vector<Eigen::Vector2d> convex_hull(PlanPoints points) {  // Andrew's monot
 std::array<Eigen::Vector2d, 4> largest_quadrilateral(PlanPoints points) {
   const auto hull = convex_hull(points);
   const std::size_t n = hull.size();
-  const auto farthest = [&](std::size_t from,
-                            std::size_t to) {  // the hull vertex between them, farthest from the chord
-    std::size_t best = from;
-    double best_area = 0;
-    for (std::size_t k = from + 1; k < to; ++k) {
-      const double area = std::abs(cross(hull[to % n] - hull[from % n], hull[k % n] - hull[from % n]));
-      if (area > best_area) best_area = area, best = k;
-    }
-    return std::pair{best % n, best_area};
+  const auto area = [&](std::size_t i, std::size_t j, std::size_t k) {  // doubled, of the triangle
+    return std::abs(cross(hull[j % n] - hull[i % n], hull[k % n] - hull[i % n]));
+  };
+  // The hull vertex farthest from the chord i-j goes on as j does: it is looked for from where it was last.
+  const auto go_on = [&](std::size_t i, std::size_t j, std::size_t& k, std::size_t end) {
+    while (k + 1 < end && area(i, j, k + 1) > area(i, j, k)) ++k;
+    return k < end ? area(i, j, k) : 0.0;
   };
   std::array<std::size_t, 4> best{};
   double best_area = -1;
   for (std::size_t i = 0; i < n; ++i) {
+    std::size_t right = i + 1, left = i + 3;
     for (std::size_t j = i + 2; j < n; ++j) {
-      const auto right = farthest(i, j), left = farthest(j, i + n);
-      if (right.second + left.second > best_area) {
-        best_area = right.second + left.second;
-        best = {i, right.first, j, left.first};
+      left = std::max(left, j + 1);
+      const double both = go_on(i, j, right, j) + go_on(i, j, left, i + n);
+      if (both > best_area) {
+        best_area = both;
+        best = {i, right, j, left < i + n ? left % n : j};
       }
     }
   }

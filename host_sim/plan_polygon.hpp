@@ -23,7 +23,7 @@ double distance_to_outline(PlanPoints, const Eigen::Vector2d&) noexcept;
 std::vector<Eigen::Vector2d> convex_hull(PlanPoints);
 
 // The four hull vertices that span the quadrilateral of largest area, counter-clockwise, beginning with the
-// one of smallest x + y: what one calls the corners of an approximately four-sided outline. Cost cubic in the
+// one of smallest x + y: what one calls the corners of an approximately four-sided outline. Cost quadratic in the
 // hull's vertices.
 std::array<Eigen::Vector2d, 4> largest_quadrilateral(PlanPoints);
 

@@ -48,11 +48,13 @@ class Plate {
     return outline_;
   }  // counter-clockwise, closed
   const std::array<Eigen::Vector2d, 4>& corners() const noexcept { return corners_; }  // counter-clockwise
+  // What a person should know of a plate that was read from a file; one line without an end, empty for formulas.
+  const std::string& remarks() const noexcept { return remarks_; }
   double thickness_mm() const noexcept { return thickness_mm_; }
   const PlateBounds& bounds() const noexcept { return bounds_; }
 
  protected:
-  std::string name_;
+  std::string name_, remarks_;
   std::vector<Eigen::Vector2d> outline_;
   std::array<Eigen::Vector2d, 4> corners_{};
   double thickness_mm_ = 0;

@@ -1,29 +1,24 @@
-// Reads a triangle mesh from a PLY file: ascii or binary little-endian, coordinates as float or double, faces
-// with any number of corners (cut into fans).
+// Reads a surface from the bytes of a PLY file: ascii and binary of either byte order, numbers and lists of every type,
+// faces of any number of corners, triangle strips, elements in any order; whatever else the file holds is passed over.
 //
-// Unit         the file's own; mesh_plate.hpp scales
-// Failure      one line with the file's name: it cannot be read, is not a PLY, is in a form not known, ends too early,
-//              has no faces, names a vertex that is not there, holds a coordinate that is not a number
+// Unit         the file's own
+// Cost         linear; memory follows the bytes that are there, never the counts that the header announces
+// Failure      one line with file, line (ascii) or byte (binary), what is wrong and what to do
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
 #include <expected>
 #include <string>
-#include <vector>
+#include <string_view>
 
 #include "host_sim/sim_error.hpp"
+#include "host_sim/triangle_mesh.hpp"
 
 namespace moldloft::host_sim {
 
-struct TriangleMesh {
-  std::vector<Eigen::Vector3d> vertices;
-  std::vector<std::array<int, 3>> triangles;
-};
+// The word "ply" on a line of its own, in any case.
+bool begins_as_ply(std::string_view bytes);
 
-std::expected<TriangleMesh, SimError> read_ply(const std::string& path);
-
-// Vertices at exactly the same place become one; triangles that lose a corner are dropped.
-TriangleMesh welded(const TriangleMesh&);
+// `name` stands in messages.
+std::expected<MeshFile, SimError> read_ply(const std::string& name, std::string_view bytes);
 
 }  // namespace moldloft::host_sim

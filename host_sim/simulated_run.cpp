@@ -84,6 +84,7 @@ std::expected<firmware_like::RunFolder, firmware_like::RunError> folder_for(
 std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& options) {
   const auto plate = placed_plate(options.cell);
   if (!plate) return std::unexpected{plate.error()};
+  if (options.on_plate) options.on_plate(*plate);
   const std::string text = options.config.empty() ? cell_toml(options.cell, *plate) : options.config;
   const auto config = firmware_like::parse_config(text, "simulated cell");
   if (!config) return std::unexpected{SimError{config.error().what}};

@@ -38,6 +38,7 @@ struct SimulatedRunOptions {
   bool write_everything =
       true;                // false: run.db and no other file; for campaigns that look at the summary only
   bool real_time = false;  // paced by the wall clock instead of as fast as it goes
+  std::function<void(const PlateInstance&)> on_plate;               // once, before the run is begun
   std::function<void(const tasks::CellProgress&)> on_progress;      // now and then, for a terminal
   std::function<void(const SimulatedCell&, hal::Instant)> on_tick;  // after every tick: faults come from here
   hal::Duration time_limit =

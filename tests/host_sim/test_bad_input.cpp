@@ -169,21 +169,40 @@ TEST_CASE("a folder that holds no run is neither resumed nor fitted") {
 
 TEST_CASE("a plate that is none is refused by what is wrong with it") {
   const Workbench bench;
-  const std::string no_ply = bench.write("panel.ply", "solid panel\n"), out = bench.path("run");
+  const std::string no_ply = bench.write("panel.ply", "these are no triangles\n"), out = bench.path("run");
+  const std::string not_a_mesh =
+      ": is neither a PLY nor an STL file (if it is binary STL, its length does not fit its count of facets)";
   check_refused(run_program({MOLDLOFT_SIM, "cell", "--plate", no_ply, "--out", out}),
-                "moldloft-sim cell: " + no_ply + ": not a PLY file");
+                "moldloft-sim cell: " + no_ply + not_a_mesh);
   check_refused(run_program({MOLDLOFT_SIM, "cell", "--plate", bench.path("none.ply"), "--out", out}),
-                "moldloft-sim cell: " + bench.path("none.ply") + ": cannot be opened");
+                "moldloft-sim cell: " + bench.path("none.ply") +
+                    ": does not exist: give the path of a PLY or STL file");
   check_refused(run_program({MOLDLOFT_SIM, "devices", "--plate", no_ply}),
-                "moldloft-sim devices: " + no_ply + ": not a PLY file");
+                "moldloft-sim devices: " + no_ply + not_a_mesh);
   check_refused(run_program({MOLDLOFT_SIM, "cell", "--plate", "cube", "--out", out}),
                 "moldloft-sim cell: no plate is called 'cube': choose flat, cylinder, saddle, twist, dome, "
-                "wave, or a file that ends in .ply");
+                "wave, or give the path of a PLY or STL file");
   check_refused(run_program({MOLDLOFT_SIM, "cell", "--width", "900", "--out", out}),
                 "moldloft-sim cell: plate 'saddle' (900 x 900 mm) does not fit under the scara arm: choose a "
                 "smaller plate, another place or "
                 "another arm");
   CHECK_FALSE(fs::exists(out));
+}
+
+TEST_CASE("an option that the plate cannot follow is refused instead of passed over") {
+  const auto refuses = [](std::vector<std::string> words, const std::string& line) {
+    words.insert(words.begin(), {MOLDLOFT_SIM, "cell"});
+    const auto refused = run_program(words);
+    CHECK(refused.exit_code == firmware_like::exit_failed);
+    CHECK(refused.err.starts_with(line));
+    CHECK(refused.out == "");
+  };
+  refuses({"--unit", "m"}, "--unit: is for mesh files; the plate 'saddle' is a formula in mm\n");
+  refuses({"--plate", "dome", "--unit", "mm"}, "--unit: is for mesh files; the plate 'dome' is a formula in mm\n");
+  refuses({"--plate", "a.ply", "--unit", "furlong"},
+          "--unit: no unit is called 'furlong': choose mm, cm, m or inch\n");
+  refuses({"--plate", "a.stl", "--width", "300"},
+          "--width: is for plates by formula; the mesh a.stl has its own shape\n");
 }
 
 TEST_CASE("a latency self-test that cannot be is refused in one line before anything is measured") {

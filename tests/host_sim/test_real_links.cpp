@@ -12,7 +12,6 @@
 #include "firmware_like/run_command.hpp"
 #include "hal/run_store.hpp"
 #include "host_sim/child_process.hpp"
-#include "host_sim/ply_reader.hpp"
 #include "host_sim/real_devices.hpp"
 
 using namespace moldloft;
