@@ -1,7 +1,7 @@
 // A surface as triangles, as it comes out of a file and as it is worked on.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <cstddef>
 #include <span>
