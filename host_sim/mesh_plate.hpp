@@ -1,14 +1,14 @@
 // A measured part as a plate: a triangle mesh whose surface is explicit once it lies flat.
 //
 // The mesh is repaired into one sheet (mesh_repair.hpp) and laid flat (mesh_flat.hpp). The outline is the mesh's border
-// in plan that encloses most; holes inside it are bridged by the nearest triangle's plane. Between vertices the surface is
-// linear. The plate's remarks() say its size and what was repaired.
+// in plan that encloses most; holes inside it are bridged by the nearest triangle's plane. Between vertices the
+// surface is linear. The plate's remarks() say its size and what was repaired.
 //
 // Cost         loading linear, a million triangles 2 s; a sample about 20 ns: a plan grid names the few triangles that
 //              may hold the point
 // Allocation   at construction only
-// Failure      as read_mesh_file(), repair() and make_explicit(); a size that speaks for another unit; numbers of too few
-//              digits
+// Failure      as read_mesh_file(), repair() and make_explicit(); a size that speaks for another unit; numbers of
+//              too few digits
 #pragma once
 
 #include <expected>

@@ -6,8 +6,8 @@
 //
 // Unit         mm
 // Cost         linear
-// Failure      one line that names the place: a face's vertex that is not a number, corners that fell together because the
-//              file has too few digits, edges with three faces, a one-sided surface, several sheets
+// Failure      one line that names the place: a face's vertex that is not a number, corners that fell together because
+//              the file has too few digits, edges with three faces, a one-sided surface, several sheets
 #pragma once
 
 #include <expected>

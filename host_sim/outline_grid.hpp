@@ -1,8 +1,8 @@
 // Point in polygon for long outlines: the same answers as contains() of plan_polygon.hpp, at a cost that does not grow
 // with the outline.
 //
-// Each cell of a grid knows the sides that pass through it, and whether its middle lies inside. From a point one goes to
-// the middle of its cell, along x and then along y, and counts the sides crossed.
+// Each cell of a grid knows the sides that pass through it, and whether its middle lies inside. From a point one
+// goes to the middle of its cell, along x and then along y, and counts the sides crossed.
 //
 // Cost         a question about 10 ns and 2 ns for each side in the point's cell; construction linear
 // Thread       any once it is made

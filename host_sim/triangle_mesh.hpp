@@ -45,7 +45,8 @@ class Polygons {
   std::size_t count() const { return ends_.size(); }
 
   // Cuts each face into triangles: a convex one into a fan, any other by its ears. Faces of fewer than three different
-  // corners give none. False when a face that is not convex has more than 5,000 corners. Cost linear but for such faces.
+  // corners give none. False when a face that is not convex has more than 5,000 corners. Cost
+  // linear but for such faces.
   bool cut_into_triangles(TriangleMesh&) const;
 
  private:

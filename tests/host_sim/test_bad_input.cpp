@@ -194,15 +194,15 @@ TEST_CASE("an option that the plate cannot follow is refused instead of passed o
     words.insert(words.begin(), {MOLDLOFT_SIM, "cell"});
     const auto refused = run_program(words);
     CHECK(refused.exit_code == firmware_like::exit_failed);
-    CHECK(refused.err.starts_with(line));
+    CHECK_MESSAGE(refused.err.starts_with("moldloft-sim cell: " + line), refused.err);
     CHECK(refused.out == "");
   };
-  refuses({"--unit", "m"}, "--unit: is for mesh files; the plate 'saddle' is a formula in mm\n");
-  refuses({"--plate", "dome", "--unit", "mm"}, "--unit: is for mesh files; the plate 'dome' is a formula in mm\n");
+  refuses({"--unit", "m"}, "--unit: is for mesh files; the plate 'saddle' is a formula in mm; ");
+  refuses({"--plate", "dome", "--unit", "mm"}, "--unit: is for mesh files; the plate 'dome' is a formula in mm; ");
   refuses({"--plate", "a.ply", "--unit", "furlong"},
-          "--unit: no unit is called 'furlong': choose mm, cm, m or inch\n");
+          "--unit: no unit is called 'furlong': choose mm, cm, m or inch; ");
   refuses({"--plate", "a.stl", "--width", "300"},
-          "--width: is for plates by formula; the mesh a.stl has its own shape\n");
+          "--width: is for plates by formula; the mesh a.stl has its own shape; ");
 }
 
 TEST_CASE("a latency self-test that cannot be is refused in one line before anything is measured") {

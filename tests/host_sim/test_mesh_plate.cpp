@@ -253,7 +253,8 @@ TEST_CASE("crumbs of a scan are left out and holes bridged, and both are said") 
   append(mesh, crumb, {0, 0, 0});
   mesh.triangles.erase(mesh.triangles.begin() + 200, mesh.triangles.begin() + 202);
   const auto plate = made(mesh);
-  CHECK(plate->bounds().max.x() - plate->bounds().min.x() == doctest::Approx(400).epsilon(3e-3));  // the hole turns the axes a little
+  // The hole turns the axes a little.
+  CHECK(plate->bounds().max.x() - plate->bounds().min.x() == doctest::Approx(400).epsilon(3e-3));
   CHECK(plate->remarks().find("left out 1 loose piece of 0.04") != std::string::npos);
   CHECK(plate->remarks().find("bridged 1 hole, the largest of 62") != std::string::npos);
 }
