@@ -1,4 +1,6 @@
 #include "firmware_like/check_command.hpp"
+#include "firmware_like/cell_claim.hpp"
+#include "firmware_like/console.hpp"
 
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -38,7 +40,7 @@ struct Findings {
     const bool wrong = finding.severity == Severity::error;
     ++(wrong ? errors : warnings);
     if (!wrong) told.what = "warning: " + told.what;
-    fmt::print(stderr, "{}\n", finding_text(path, told));
+    say(fmt::format("{}\n", finding_text(path, told)));
   }
   void tell(Severity severity, const CellConfig& config, const std::string& key, const std::string& what) {
     const auto line = config.key_lines.find(key);
@@ -96,11 +98,11 @@ void print_memory(const CellConfig& c, Findings& findings) {
     return findings.tell(Severity::error, c, "plate.largest_mm",
                          "[plate] largest_mm: the memory plan is larger than what this machine has");
   }
-  fmt::print("memory plan\n");
+  show(fmt::format("memory plan\n"));
   for (const auto& item : plan)
-    fmt::print("  {:<22}{:>10.1f} MiB\n", item.subsystem, static_cast<double>(item.plan_bytes) / mib);
+    show(fmt::format("  {:<22}{:>10.1f} MiB\n", item.subsystem, static_cast<double>(item.plan_bytes) / mib));
   const double total = static_cast<double>(total_plan(plan)) / mib, there = available_mib();
-  fmt::print("  {:<22}{:>10.1f} MiB of {:.0f} available\n", "in all", total, there);
+  show(fmt::format("  {:<22}{:>10.1f} MiB of {:.0f} available\n", "in all", total, there));
   if (there > 0 && total > there)
     findings.tell(Severity::warning, c, "plate.largest_mm",
                   fmt::format("[plate] largest_mm: the memory plan asks for {:.0f} MiB, {:.0f} are available",
@@ -111,14 +113,16 @@ void print_limits(const CellConfig& c) {
   const auto& w = c.robot.workspace;
   const auto range = [](const tasks::Range& r) { return fmt::format("{:g} to {:g} mm", r.min, r.max); };
   const hal::Pose tip = tasks::tip_pose_for(c.start, c.scanner.tip_from_scanner);
-  fmt::print("limits\n  tip x                 {}\n  tip y                 {}\n  tip z                 {}\n",
-             range(w.x_mm), range(w.y_mm), range(w.z_mm));
-  fmt::print("  reach                 {}\n  longest step          {:g} mm\n", range(w.reach_mm),
-             w.max_step_mm);
-  fmt::print("  speed                 {} % of at most {} %\n", c.robot.speed_percent, w.max_speed_percent);
-  fmt::print("  largest plate         {:g} x {:g} mm\n", c.plate.largest_x_mm, c.plate.largest_y_mm);
-  fmt::print("  start                 looks at {:g} {:g} {:g} mm, tip at {:.1f} {:.1f} {:.1f} mm\n",
-             c.start.centre.x(), c.start.centre.y(), c.start.centre.z(), tip.x_mm, tip.y_mm, tip.z_mm);
+  show(fmt::format(
+      "limits\n  tip x                 {}\n  tip y                 {}\n  tip z                 {}\n",
+      range(w.x_mm), range(w.y_mm), range(w.z_mm)));
+  show(fmt::format("  reach                 {}\n  longest step          {:g} mm\n", range(w.reach_mm),
+                   w.max_step_mm));
+  show(fmt::format("  speed                 {} % of at most {} %\n", c.robot.speed_percent,
+                   w.max_speed_percent));
+  show(fmt::format("  largest plate         {:g} x {:g} mm\n", c.plate.largest_x_mm, c.plate.largest_y_mm));
+  show(fmt::format("  start                 looks at {:g} {:g} {:g} mm, tip at {:.1f} {:.1f} {:.1f} mm\n",
+                   c.start.centre.x(), c.start.centre.y(), c.start.centre.z(), tip.x_mm, tip.y_mm, tip.z_mm));
 }
 
 // Asked for as a run would, and given back at once.
@@ -130,33 +134,36 @@ void print_setup(const CellConfig& c) {
     rows = process.rows();
     std::ranges::copy(control.setup(), std::back_inserter(rows));
   }
-  fmt::print("real-time set-up\n");
+  show(fmt::format("real-time set-up\n"));
   for (const auto& row : rows)
-    fmt::print(
+    show(fmt::format(
         "  {:<22}{}{}\n", to_string(row.item), row.got,
-        row.ok ? "" : fmt::format("; not got: {}{}{}", row.wanted, row.hint.empty() ? "" : ": ", row.hint));
+        row.ok ? "" : fmt::format("; not got: {}{}{}", row.wanted, row.hint.empty() ? "" : ": ", row.hint)));
   const Verdict verdict = verdict_on(read_environment(c.realtime.cpu), rows, c.realtime);
-  fmt::print("  {:<22}{}\n", "timing figures",
-             verdict.representative ? "representative" : "not representative: " + verdict.why());
+  show(fmt::format("  {:<22}{}\n", "timing figures",
+                   verdict.representative ? "representative" : "not representative: " + verdict.why()));
 }
 
 void print_devices(const CellConfig& c, Findings& findings) {
+  const auto claim = claim_cell(c);
+  if (!claim) return findings.tell({Severity::error, 0, claim.error(), {}});
   hal::SteadyClock clock;
   const auto scanner = hal::make_tcp_link(c.scanner.host, static_cast<std::uint16_t>(c.scanner.port));
   const auto robot = hal::make_serial_link(c.robot.device, c.robot.baud);
   std::random_device any;
   const auto reports = try_devices(c, clock, *scanner, *robot, any() | 1u);
-  fmt::print("devices\n");
-  const auto show = [&](const char* name, const std::string& where, const DeviceReport& report,
-                        const char* key) {
+  show(fmt::format("devices\n"));
+  const auto show_device = [&](const char* name, const std::string& where, const DeviceReport& report,
+                               const char* key) {
     if (report.ok)
-      fmt::print("  {:<22}{}\n", name, report.text);
+      show(fmt::format("  {:<22}{}\n", name, report.text));
     else
       findings.tell(Severity::error, c, key, fmt::format("{} ({}): {}", name, where, report.text));
     for (const auto& warning : report.warnings) findings.tell({Severity::warning, 0, warning, {}});
   };
-  show("scanner", fmt::format("{}:{}", c.scanner.host, c.scanner.port), reports.scanner, "scanner.host");
-  show("robot", c.robot.device, reports.robot, "robot.device");
+  show_device("scanner", fmt::format("{}:{}", c.scanner.host, c.scanner.port), reports.scanner,
+              "scanner.host");
+  show_device("robot", c.robot.device, reports.robot, "robot.device");
 }
 
 std::string counted(int n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
@@ -178,11 +185,12 @@ int check_cell(const CheckOptions& options) {
   }
   if (readable && options.connect) print_devices(examined.config, findings);
   if (!readable && options.connect)
-    fmt::print(stderr, "{}: not connected before its errors are mended\n", options.config);
-  std::fflush(stdout);
-  fmt::print(findings.errors > 0 ? stderr : stdout, "{}: {}, {}\n", options.config,
-             findings.errors > 0 ? counted(findings.errors, "error") : "good",
-             counted(findings.warnings, "warning"));
+    say(fmt::format("{}: not connected before its errors are mended\n", options.config));
+  flush_shown();
+  const std::string verdict = fmt::format("{}: {}, {}\n", options.config,
+                                          findings.errors > 0 ? counted(findings.errors, "error") : "good",
+                                          counted(findings.warnings, "warning"));
+  findings.errors > 0 ? say(verdict) : show(verdict);
   return findings.errors > 0 ? exit_failed : exit_done;
 }
 

@@ -4,10 +4,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "firmware_like/console.hpp"
 #include "firmware_like/run_command.hpp"
 
 namespace moldloft::firmware_like {
@@ -106,7 +108,12 @@ std::optional<int> parse_command_line(CLI::App& app, int argc, char** argv) {
     app.parse(argc, argv);
     return {};
   } catch (const CLI::ParseError& e) {
-    if (e.get_exit_code() == 0) return app.exit(e), exit_done;
+    if (e.get_exit_code() == 0) {
+      std::ostringstream help;
+      app.exit(e, help, help);
+      show(help.str());
+      return exit_done;
+    }
     const auto parsed = app.get_subcommands();
     const CLI::App& command = parsed.empty() ? app : *parsed.front();
     const std::string name = parsed.empty() ? app.get_name() : app.get_name() + " " + command.get_name();

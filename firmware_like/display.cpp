@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <cstdio>
+#include "firmware_like/console.hpp"
+#include "firmware_like/stop_signals.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -57,19 +58,22 @@ void DisplayThread::work() {
     clock_.sleep_until(clock_.now() + display_period);
   }
   show(cell_.progress());
-  if (terminal_) fmt::print(stderr, "{}", begun_ ? "\n" : "\r\x1b[K");
+  if (terminal_) say(begun_ ? "\n" : "\r\x1b[K");
 }
 
 void DisplayThread::show(const tasks::CellProgress& p) {
   const bool begins = p.state == tasks::CellState::execute || p.state == tasks::CellState::held;
   if (!begun_ && begins) {
     begun_ = true;
-    fmt::print(stderr, "{}{}\n", terminal_ ? "\r\x1b[K" : "", head_);
+    say(fmt::format("{}{}\n", terminal_ ? "\r\x1b[K" : "", head_));
+  }
+  if (StopSignals::suspension_was_asked()) {
+    say(fmt::format("{}moldloft: ctrl-Z does nothing while the arm may move; ctrl-C stops and saves\n",
+                    terminal_ ? "\r\x1b[K" : ""));
   }
   const std::string line = progress_line(p);
   if (terminal_) {
-    fmt::print(stderr, "\r\x1b[K{}", line);
-    std::fflush(stderr);
+    say("\r\x1b[K" + line);
     return;
   }
   // Everything but the clock: a log gets a line when something has happened.
@@ -77,7 +81,7 @@ void DisplayThread::show(const tasks::CellProgress& p) {
   if (const auto left = content.find("  left"); left != std::string::npos) content.resize(left);
   if (!begun_ || content == last_) return;
   last_ = content;
-  fmt::print(stderr, "{}\n", line);
+  say(line + "\n");
 }
 
 }  // namespace moldloft::firmware_like

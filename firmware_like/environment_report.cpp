@@ -85,6 +85,7 @@ void put_conditions(Json& report, const RunConditions* conditions) {
   report["environment"] = environment_json(conditions->environment);
   report["setup"] = setup_json(conditions->setup);
   report["control_thread"] = counts_json(conditions->control_thread);
+  report["unsaid_lines"] = conditions->unsaid_lines;
   report["representative"] = verdict.representative;
   report["why"] = verdict.why();
 }

@@ -14,6 +14,7 @@ struct RunConditions {
   Environment environment;
   SetupRows setup;
   ThreadCounts control_thread = {};  // what the operating system did to it
+  std::uint64_t unsaid_lines = 0;    // meant for a person, and taken by nobody (console.hpp)
 };
 
 Json environment_json(const Environment&);

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include "firmware_like/cad_files.hpp"
+#include "firmware_like/console.hpp"
 #include "firmware_like/run_command.hpp"
+#include "firmware_like/whole_file.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -44,8 +46,11 @@ std::expected<void, RunError> exported(const ExportOptions& options) {
     if (file.empty()) return {};
     const auto text = text_of(*surface, *facts, file.filename().string());
     if (!text) return error(fmt::format("{}: cannot be exported as {}", path->string(), text.error().what));
-    if (auto written = write_file(file, *text); !written) return written;
-    fmt::print("{}: {} x {} control points, mm\n", file.string(), surface->control_u(), surface->control_v());
+    const Existing existing = options.force ? Existing::replaced : Existing::kept;
+    if (auto written = write_file(file, *text, existing); !written) return written;
+    const std::string line = fmt::format("{}: {} x {} control points, mm\n", file.string(),
+                                         surface->control_u(), surface->control_v());
+    is_standard_output(file) ? say(line) : show(line);
     return {};
   };
   if (auto step = write(options.step, step_file); !step) return step;
@@ -57,7 +62,7 @@ std::expected<void, RunError> exported(const ExportOptions& options) {
 int export_run(const ExportOptions& options) {
   const auto done = exported(options);
   if (done) return exit_done;
-  fmt::print(stderr, "moldloft: {}\n", done.error().what);
+  say(fmt::format("moldloft: {}\n", done.error().what));
   return exit_failed;
 }
 

@@ -10,6 +10,7 @@ struct ExportOptions {
   std::string run;   // a run's folder, or a surface.json; read only
   std::string step;  // where to; empty: not asked for
   std::string iges;
+  bool force = false;  // even over a file that says something else
 };
 int export_run(const ExportOptions&);
 

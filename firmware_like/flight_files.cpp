@@ -8,8 +8,9 @@
 #include <array>
 #include <atomic>
 #include <csignal>
-#include <cstdio>
 #include <cstring>
+
+#include "firmware_like/console.hpp"
 
 namespace moldloft::firmware_like {
 
@@ -26,7 +27,8 @@ std::vector<std::filesystem::path> flight_dumps(const std::filesystem::path& fol
 
 FlightFiles::FlightFiles(hal::FlightRecorder& flight, std::filesystem::path folder)
     : flight_{flight}, folder_{std::move(folder)} {
-  while (std::filesystem::exists(folder_ / fmt::format("flight-{:02}.bin", next_))) ++next_;
+  std::error_code failed;
+  while (std::filesystem::exists(folder_ / fmt::format("flight-{:02}.bin", next_), failed)) ++next_;
 }
 
 FlightFiles::~FlightFiles() {
@@ -43,8 +45,8 @@ void FlightFiles::write() {
   const bool written = file >= 0 && flight_.dump(file);
   if (file >= 0) ::close(file);
   if (!written) {
-    fmt::print(stderr, "moldloft: {}: the flight recorder's dump cannot be written; is the disk full?\n",
-               path.string());
+    say(fmt::format("moldloft: {}: the flight recorder's dump cannot be written; is the disk full?\n",
+                    path.string()));
     std::error_code ignored;
     std::filesystem::remove(path, ignored);
   }
@@ -84,7 +86,9 @@ void on_request(int) {
 }  // namespace
 
 CrashDump::CrashDump(Controller& controller, const std::filesystem::path& folder) {
-  const std::string path = std::filesystem::absolute(folder / "flight-crash.bin");
+  std::error_code failed;  // the folder that the program was started in may be gone
+  const auto absolute = std::filesystem::absolute(folder / "flight-crash.bin", failed);
+  const std::string path = failed ? folder / "flight-crash.bin" : absolute;
   std::strncpy(crash_path.data(), path.c_str(), crash_path.size() - 1);
   watched = &controller;
   for (const int number : fatal_signals) std::signal(number, on_fatal);

@@ -4,20 +4,20 @@
 #include <stdlib.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <csignal>
 #include <filesystem>
 #include <iterator>
 #include <semaphore>
 #include <utility>
 
+#include "firmware_like/console.hpp"
 #include "firmware_like/control_thread.hpp"
 #include "firmware_like/flight_files.hpp"
 #include "firmware_like/latency_load.hpp"
 #include "firmware_like/recorder_thread.hpp"
 #include "firmware_like/results.hpp"
 #include "firmware_like/run_command.hpp"
+#include "firmware_like/stop_signals.hpp"
 #include "firmware_like/task_table.hpp"
 #include "firmware_like/thread_counts.hpp"
 #include "firmware_like/timing_page.hpp"
@@ -35,13 +35,6 @@ constexpr double longest_s = 30 * 24 * 3600.0;
 constexpr auto longest_tick = 100ms;
 
 int refuse(std::string_view what) { return complain(what, "moldloft latency"); }
-
-// Ctrl-C ends the measurement; what was measured so far is reported.
-std::atomic<bool> interrupted{false};
-void on_interrupt(int signal) {
-  interrupted = true;
-  std::signal(signal, SIG_DFL);
-}
 
 // Where the run store lies: in the folder asked for, or in one that goes when the measurement is over.
 class Workplace {
@@ -99,7 +92,7 @@ class Turns {
       const auto end = scheduler.next_tick() + ticks_ * scheduler.settings().tick;
       const auto warm = scheduler.ticks() + scheduler.settings().warm_up_ticks;
       const auto goes_on = [&] {
-        return scheduler.next_tick() < end && !interrupted && scheduler.run_tick();
+        return scheduler.next_tick() < end && !StopSignals::asked() && scheduler.run_tick();
       };
       while (scheduler.ticks() < warm && goes_on()) {
       }
@@ -136,7 +129,7 @@ std::expected<Measured, RunError> measure(LatencyLoad& load, RunFolder& folder, 
   FlightFiles flight{load.flight(), folder.path};
   const ProcessSetup process{config.realtime};
   Turns turns{load, config.realtime, plan.ticks};
-  for (int turn = 0; turn < plan.turns && !interrupted; ++turn) {
+  for (int turn = 0; turn < plan.turns && !StopSignals::asked(); ++turn) {
     {
       const RecorderThread recorder{load.recorder(), *folder.store, flight};
       if (turn == 0) {
@@ -146,7 +139,7 @@ std::expected<Measured, RunError> measure(LatencyLoad& load, RunFolder& folder, 
       }
       turns.take();
     }
-    if (!compare || interrupted) continue;
+    if (!compare || StopSignals::asked()) continue;
     const auto theirs = run_cyclictest(same_as(m.conditions, config.tick, plan.ticks), folder.path);
     if (!theirs) return std::unexpected{theirs.error()};
     if (!m.cyclictest) m.cyclictest.emplace();
@@ -259,19 +252,17 @@ Json latency_json(const Json& timing) {
 
 int measure_latency(const LatencyOptions& options) {
   if (const auto why = refused(options)) return refuse(*why);
+  // Ctrl-C ends the measurement; what was measured so far is reported.
+  const StopSignals signals;
   const auto config = config_of(options);
   if (!config) return refuse(config.error().what);
   auto place = Workplace::make(options.out);
   if (!place) return refuse(place.error().what);
   auto folder = create_run(place->path(), config->text, RunKind::measured);
   if (!folder) return refuse(folder.error().what);
-  interrupted = false;
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
-
   const bool compare = !options.compare.empty();
   if (!options.json)
-    fmt::print(stderr, "measuring for {:.0f} s; ctrl-C ends it with what there is\n", options.duration_s);
+    say(fmt::format("measuring for {:.0f} s; ctrl-C ends it with what there is\n", options.duration_s));
   hal::SteadyClock clock;
   const auto load = std::make_unique<LatencyLoad>(*config, clock);
   const auto measured =
@@ -294,10 +285,10 @@ int measure_latency(const LatencyOptions& options) {
     }
   }
   if (options.json)
-    fmt::print("{}\n", latency_json(timing).dump(2));
+    show(fmt::format("{}\n", latency_json(timing).dump(2)));
   else
-    fmt::print("{}\n{}{}", conditions_text(measured->conditions), busy_line(timing["busy"]),
-               timing_table(timing));
+    show(fmt::format("{}\n{}{}", conditions_text(measured->conditions), busy_line(timing["busy"]),
+                     timing_table(timing)));
   return exit_done;
 }
 

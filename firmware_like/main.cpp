@@ -2,10 +2,13 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <sstream>
+#include <system_error>
 
 #include "firmware_like/build_info.hpp"
 #include "firmware_like/check_command.hpp"
 #include "firmware_like/command_line.hpp"
+#include "firmware_like/console.hpp"
 #include "firmware_like/export_command.hpp"
 #include "firmware_like/latency_command.hpp"
 #include "firmware_like/machines.hpp"
@@ -16,7 +19,9 @@
 
 using namespace moldloft::firmware_like;
 
-int main(int argc, char** argv) {
+namespace {
+
+int run_command_line(int argc, char** argv) {
   CLI::App app{"Moldloft: measures formed ship plates with a laser-stripe scanner on a robot", "moldloft"};
   app.set_version_flag("--version", "moldloft " + version_text(), "version, commit and compiler");
   app.require_subcommand(1);
@@ -37,8 +42,7 @@ int main(int argc, char** argv) {
                         "begin or go on with the run in --out, held until told unhold");
   run_command->add_option("--control", run.control,
                           "socket for `moldloft tell`; with it a person is waited for");
-  run_command->add_option("--go-on", run.go_on,
-                          "of what starts this program: the command to advise");
+  run_command->add_option("--go-on", run.go_on, "of what starts this program: the command to advise");
 
   CheckOptions check;
   auto* check_command = app.add_subcommand("check", "all that can be known before a plate is measured");
@@ -56,12 +60,14 @@ int main(int argc, char** argv) {
       app.add_subcommand("fit", "outline and surface once more from the shots of a stored run");
   fit_command->add_option("run", fit.run, "the run's folder")->required();
   fit_command->add_option("--out", fit.out, "where the results go")->required();
+  fit_command->add_flag("--force", fit.force, "write over another run's results");
 
   ExportOptions to_cad;
   auto* export_command = app.add_subcommand("export", "the surface of a run as STEP and IGES files");
   export_command->add_option("run", to_cad.run, "the run's folder, or a surface.json")->required();
   export_command->add_option("--step", to_cad.step, "the STEP file to write (AP242)");
   export_command->add_option("--iges", to_cad.iges, "the IGES file to write (5.3)");
+  export_command->add_flag("--force", to_cad.force, "write over a file that says something else");
 
   ReplayOptions replay;
   auto* replay_command = app.add_subcommand("replay", "what a stored run did, in order of time");
@@ -103,8 +109,22 @@ int main(int argc, char** argv) {
   if (*latency_command) return measure_latency(latency);
   if (*report_command) return report_run(report);
   if (*machines_command) {
-    fmt::print("{}", machine_diagrams());
+    show(machine_diagrams());
     return exit_done;
   }
   return exit_failed;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  open_console();
+  try {
+    return end_of_output(run_command_line(argc, argv), "moldloft");
+  } catch (const std::system_error& e) {
+    return complain(fmt::format("the system refuses: {}; is a limit of this user too low (ulimit -a)?",
+                                e.code().message()));
+  } catch (const std::exception& e) {
+    return complain(fmt::format("a defect, please report it: {}", e.what()));
+  }
 }

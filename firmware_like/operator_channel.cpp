@@ -14,6 +14,7 @@
 #include <optional>
 #include <vector>
 
+#include "firmware_like/console.hpp"
 #include "firmware_like/run_command.hpp"
 
 namespace moldloft::firmware_like {
@@ -201,10 +202,10 @@ std::expected<std::string, std::string> ask_cell(const std::string& word, const 
 int tell_cell(const TellOptions& options) {
   const auto answer = ask_cell(options.word, options.control);
   if (!answer || answer->starts_with("refused:")) {
-    fmt::print(stderr, "moldloft: {}\n", answer ? *answer : answer.error());
+    say(fmt::format("moldloft: {}\n", answer ? *answer : answer.error()));
     return exit_failed;
   }
-  fmt::print("{}\n", *answer);
+  show(fmt::format("{}\n", *answer));
   return exit_done;
 }
 

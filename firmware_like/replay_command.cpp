@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "firmware_like/console.hpp"
 #include "firmware_like/flight_files.hpp"
 #include "firmware_like/flight_timeline.hpp"
 #include "firmware_like/run_command.hpp"
@@ -23,15 +24,16 @@ int show_timelines(const ReplayOptions& options) {
   const std::vector<fs::path> dumps =
       is_file ? std::vector<fs::path>{options.run} : flight_dumps(options.run);
   if (dumps.empty()) {
-    fmt::print("{}: the flight recorder was never frozen: no overrun, no missed tick, no abort, no crash\n",
-               options.run);
+    show(fmt::format(
+        "{}: the flight recorder was never frozen: no overrun, no missed tick, no abort, no crash\n",
+        options.run));
     return exit_done;
   }
   for (const fs::path& path : dumps) {
     const auto dump = hal::read_flight_dump(path);
     if (!dump) return complain(dump.error().what);
-    fmt::print("{}\n{}\n", path.string(),
-               flight_timeline(*dump, {.ticks_before = options.ticks, .all = options.all_ticks}));
+    show(fmt::format("{}\n{}\n", path.string(),
+                     flight_timeline(*dump, {.ticks_before = options.ticks, .all = options.all_ticks})));
   }
   return exit_done;
 }
@@ -64,7 +66,7 @@ int show_events(const ReplayOptions& options) {
   std::ranges::stable_sort(lines, {}, &std::pair<hal::Instant, std::string>::first);
   for (auto& [at, line] : lines) {
     line.erase(line.find_last_not_of(' ') + 1);
-    fmt::print("{:>11.3f} s  {}\n", std::chrono::duration<double>(at).count(), line);
+    show(fmt::format("{:>11.3f} s  {}\n", std::chrono::duration<double>(at).count(), line));
   }
   return exit_done;
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "firmware_like/console.hpp"
 #include "firmware_like/results.hpp"
 #include "firmware_like/run_command.hpp"
 #include "firmware_like/timing_page.hpp"
@@ -34,7 +35,7 @@ int report_run(const ReportOptions& options) {
   }
   if (const auto written = write_file(folder / "report.html", page); !written)
     return refuse(written.error().what);
-  fmt::print("{}\nreport                      {}\n", text, (folder / "report.html").string());
+  show(fmt::format("{}\nreport                      {}\n", text, (folder / "report.html").string()));
   return exit_done;
 }
 

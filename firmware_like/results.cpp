@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstdio>
-#include <fstream>
 
 #include "firmware_like/build_info.hpp"
 #include "firmware_like/cad_files.hpp"
@@ -115,19 +113,6 @@ Json summary_of(const Controller& c, const RunLabel& label) {
   return j;
 }
 
-std::expected<void, RunError> write_file(const std::filesystem::path& path, std::string_view content) {
-  const std::filesystem::path beside = path.string() + ".new";
-  std::ofstream file{beside, std::ios::binary};
-  file.write(content.data(), static_cast<std::streamsize>(content.size()));
-  file.close();
-  std::error_code failed;
-  if (file) std::filesystem::rename(beside, path, failed);
-  if (file && !failed) return {};
-  std::filesystem::remove(beside, failed);
-  return std::unexpected{
-      RunError{fmt::format("{}: cannot be written; is the disk full or read-only?", path.string())}};
-}
-
 namespace {
 
 std::string events_jsonl(const std::vector<hal::EventRecord>& events) {
@@ -179,7 +164,8 @@ std::expected<void, RunError> write_results(const Controller& c, const RunFolder
                                             const std::optional<PlateField>& error_field) {
   std::expected<void, RunError> result;
   const auto write = [&](const char* name, std::string_view content) {
-    if (result) result = write_file(folder.path / name, content);
+    auto written = write_file(folder.path / name, content);
+    if (result) result = std::move(written);
   };
   std::vector<PlateField> fields;
   if (c.cell().state() == tasks::CellState::complete) {

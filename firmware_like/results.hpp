@@ -6,7 +6,7 @@
 // with the same seed gives the same bytes. What was measured in wall-clock time stands in timing.json.
 //
 // Blocking     yes: writes files
-// Failure      one line naming the file
+// Failure      one line naming the first file that could not be written; all others are
 #pragma once
 
 #include <cstdint>
@@ -20,6 +20,7 @@
 #include "firmware_like/picture.hpp"
 #include "firmware_like/run_folder.hpp"
 #include "firmware_like/surface_file.hpp"
+#include "firmware_like/whole_file.hpp"
 
 namespace moldloft::firmware_like {
 
@@ -42,8 +43,5 @@ Json summary_of(const Controller&, const RunLabel&);
 std::expected<void, RunError> write_results(const Controller&, const RunFolder&, const RunLabel&,
                                             const Json& summary,
                                             const std::optional<PlateField>& error_field = {});
-
-// Replaces a file as a whole: written beside it first, so that a full disk never leaves half a file.
-std::expected<void, RunError> write_file(const std::filesystem::path&, std::string_view content);
 
 }  // namespace moldloft::firmware_like

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 #include <ctime>
 #include <iterator>
 #include <optional>
 #include <random>
 
+#include "firmware_like/cell_claim.hpp"
+#include "firmware_like/console.hpp"
 #include "firmware_like/control_loop.hpp"
 #include "firmware_like/control_thread.hpp"
 #include "firmware_like/display.hpp"
@@ -17,6 +17,7 @@
 #include "firmware_like/plate_name.hpp"
 #include "firmware_like/recorder_thread.hpp"
 #include "firmware_like/service_thread.hpp"
+#include "firmware_like/stop_signals.hpp"
 #include "firmware_like/timing_report.hpp"
 #include "firmware_like/timing_table.hpp"
 #include "hal/cable.hpp"
@@ -26,45 +27,8 @@
 namespace moldloft::firmware_like {
 namespace {
 
-std::atomic<Controller*> interrupted_controller{nullptr};
-std::atomic<bool> interrupted{false};
-
-// A cell that waits for an operator, aborted or held, does so no longer.
-void end(Controller& controller) {
-  controller.dismiss_operator();
-  controller.cell().command(tasks::CellEvent::stop);
-}
-
-// The first ctrl-C stops the arm and saves; the second ends the program the hard way.
-void on_interrupt(int signal) {
-  interrupted = true;
-  if (Controller* controller = interrupted_controller.load()) end(*controller);
-  std::signal(signal, SIG_DFL);
-}
-
-// From before the first file is made to after the cell has come to rest: a ctrl-C in between never leaves
-// half of either.
-class InterruptGuard {
- public:
-  InterruptGuard() {
-    interrupted = false;
-    std::signal(SIGINT, on_interrupt);
-    std::signal(SIGTERM, on_interrupt);
-  }
-  ~InterruptGuard() { let_go(); }
-  InterruptGuard(const InterruptGuard&) = delete;
-  InterruptGuard& operator=(const InterruptGuard&) = delete;
-
-  void stops(Controller& controller) {
-    interrupted_controller = &controller;
-    if (interrupted) end(controller);
-  }
-  void let_go() {
-    std::signal(SIGINT, SIG_DFL);
-    std::signal(SIGTERM, SIG_DFL);
-    interrupted_controller = nullptr;
-  }
-};
+// A result's table is a courtesy: the run has to end whoever reads it.
+constexpr auto patience_with_a_reader = std::chrono::seconds{5};
 
 std::string memory_line(const Controller& controller) {
   std::string line = "memory plan:";
@@ -83,6 +47,28 @@ std::string head_lines(const Controller& controller, const RunConditions& condit
   return lines;
 }
 
+// A name as it can be typed into a shell, on one line.
+std::string shell_word(const std::string& name) {
+  constexpr std::string_view harmless =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./:=@%+,";
+  if (!name.empty() && name.find_first_not_of(harmless) == std::string::npos) return name;
+  const bool has_control = std::ranges::any_of(name, [](unsigned char c) { return c < ' ' || c == 0x7F; });
+  std::string word = has_control ? "$'" : "'";
+  for (const char c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < ' ' || byte == 0x7F) {
+      word += fmt::format("\\{:03o}", byte);
+    } else if (c == '\'') {
+      word += has_control ? "\\'" : "'\\''";
+    } else if (c == '\\' && has_control) {
+      word += "\\\\";
+    } else {
+      word += c;
+    }
+  }
+  return word + "'";
+}
+
 // One line for a run that did not complete: what happened, what is saved where, how to go on.
 std::string how_it_ended(const Controller& controller, const RunOptions& options, const std::string& folder) {
   const auto& cell = controller.cell();
@@ -96,9 +82,10 @@ std::string how_it_ended(const Controller& controller, const RunOptions& options
                        what, folder);
   }
   const bool too_small = cell.cause() == tasks::HoldCause::plan && cell.state() == tasks::CellState::held;
-  const std::string again =
-      options.go_on.empty() ? fmt::format("moldloft run {} --out {} --resume", options.config_path, folder)
-                            : options.go_on;
+  const std::string again = options.go_on.empty()
+                                ? fmt::format("moldloft run {} --out {} --resume",
+                                              shell_word(options.config_path), shell_word(folder))
+                                : options.go_on;
   return fmt::format("{}. Everything so far is saved; to go on{}: {}", what, too_small ? " after that" : "",
                      again);
 }
@@ -138,7 +125,7 @@ std::expected<RunNames, std::string> names_given(const RunOptions& options) {
 }  // namespace
 
 int complain(std::string_view what, std::string_view program) {
-  fmt::print(stderr, "{}: {}\n", program, what);
+  say(fmt::format("{}: {}\n", program, what));
   return exit_failed;
 }
 
@@ -196,27 +183,93 @@ std::string result_table(const Json& s, const std::string& folder) {
   return t;
 }
 
+namespace {
+
+std::optional<std::string> contradiction_in(const RunOptions& options) {
+  if (options.resume && options.out.empty()) return "--resume: give the run's folder with --out";
+  if (options.resume_held && (options.out.empty() || options.control.empty()))
+    return "--resume-held: give the run's folder with --out, and --control: nobody could say unhold";
+  return std::nullopt;
+}
+
+// The run, from the first tick to the cell's rest, with all that goes on beside it.
+RunConditions run_beside_threads(Controller& controller, const CellConfig& config, const RunFolder& folder,
+                                 OperatorSocket* operator_socket, std::optional<ServiceThread>& service) {
+  RunConditions conditions{config.realtime, read_environment(config.realtime.cpu), {}, {}};
+  FlightFiles flight{controller.flight(), folder.path};
+  const CrashDump crash{controller, folder.path};
+  const ProcessSetup process{config.realtime};
+  ControlThread control{config.realtime, [&] { conditions.control_thread = run_to_rest(controller); }};
+  const RecorderThread recorder{controller.recorder(), *folder.store, flight};
+  std::optional<OperatorThread> operators;
+  if (operator_socket != nullptr) operators.emplace(*operator_socket, controller.cell());
+  service.emplace(controller, folder.path);
+  conditions.setup = process.rows();
+  std::ranges::copy(control.setup(), std::back_inserter(conditions.setup));
+  conditions.setup.push_back(check_ordinary_threads(control.id(), config.realtime));
+  const DisplayThread display{controller.cell(), head_lines(controller, conditions)};
+  control.begin();
+  control.join();
+  service->loop_has_ended();
+  return conditions;
+}
+
+// What is left behind and said when the cell has come to rest.
+int wind_up(Controller& controller, RunFolder folder, const RunOptions& options, bool resumed,
+            const RunConditions& conditions) {
+  const int code = exit_code(controller);
+  if (!resumed && !controller.cell().has_driven()) {
+    discard_run(std::move(folder));
+    return complain(why_refused(controller)), code == exit_aborted ? exit_failed : code;
+  }
+  const RunLabel label{.plate = folder.names.plate,
+                       .seed = {},
+                       .begun = begun_of(*folder.store),
+                       .conditions = &conditions,
+                       .remark = folder.names.remark};
+  const Json summary = summary_of(controller, label);
+  const bool store_failed = controller.recorder().store_failed();
+  if (store_failed) {
+    complain(
+        fmt::format("{}; what came after that is not saved", controller.recorder().store_error().view()));
+  }
+  if (const auto back = bring_back(folder); !back)
+    complain(back.error().what);
+  else if (*back)
+    complain(fmt::format("{}: was removed during the run; made again, with all that was recorded",
+                         folder.path.string()));
+  const auto written = write_results(controller, folder, label, summary);
+  if (!written) complain(written.error().what);
+  if (code != exit_done) complain(how_it_ended(controller, options, folder.path.string()));
+  if (!written) return exit_failed;
+  if (code != exit_done) return code;
+  const std::string table = result_table(summary, folder.path.string());
+  if (!show_within(patience_with_a_reader, table + timing_lines(timing_of(controller, &conditions))))
+    complain(fmt::format("complete; the table cannot be written to standard output: moldloft report {}",
+                         folder.path.string()));
+  return store_failed ? exit_failed : exit_done;
+}
+
+}  // namespace
+
 int run_cell(const RunOptions& options) {
   const auto config = load_config(options.config_path);
   if (!config) return complain(config.error().what);
-  const std::filesystem::path out =
-      options.out.empty() ? default_run_path() : std::filesystem::path{options.out};
-  if (options.resume && options.out.empty()) return complain("--resume: give the run's folder with --out");
-  if (options.resume_held && (options.out.empty() || options.control.empty()))
-    return complain(
-        "--resume-held: give the run's folder with --out, and --control: nobody could say unhold");
+  if (const auto why = contradiction_in(options)) return complain(*why);
   const auto names = names_given(options);
   if (!names) return complain(names.error());
-  const bool resume = options.resume || (options.resume_held && holds_run(out));
-  InterruptGuard guard;
+  const bool resume = options.resume || (options.resume_held && holds_run(options.out));
+  StopSignals signals;
+  const auto devices = claim_cell(*config);
+  if (!devices) return complain(devices.error());
   std::optional<OperatorSocket> operator_socket;
   if (!options.control.empty()) {
     auto opened = OperatorSocket::open(options.control);
     if (!opened) return complain(opened.error());
     operator_socket.emplace(std::move(*opened));
   }
-  auto folder = resume ? resume_run(out, config->text, *names)
-                       : create_run(out, config->text, RunKind::measured, *names);
+  auto folder = resume ? resume_run(options.out, config->text, *names)
+                       : create_run(options.out, config->text, RunKind::measured, *names);
   if (!folder) return complain(folder.error().what);
 
   hal::SteadyClock clock;
@@ -229,47 +282,48 @@ int run_cell(const RunOptions& options) {
                                                      .epoch = fresh_epoch(),
                                                      .begin_held = options.resume_held,
                                                      .attended = operator_socket.has_value()});
-  guard.stops(*controller);
-  RunConditions conditions{config->realtime, read_environment(config->realtime.cpu), {}, {}};
+  signals.stops(controller.get());
   std::optional<ServiceThread> service;
-  {
-    FlightFiles flight{controller->flight(), folder->path};
-    const CrashDump crash{*controller, folder->path};
-    const ProcessSetup process{config->realtime};
-    ControlThread control{config->realtime, [&] { conditions.control_thread = run_to_rest(*controller); }};
-    const RecorderThread recorder{controller->recorder(), *folder->store, flight};
-    std::optional<OperatorThread> operators;
-    if (operator_socket) operators.emplace(*operator_socket, controller->cell());
-    service.emplace(*controller, folder->path);
-    conditions.setup = process.rows();
-    std::ranges::copy(control.setup(), std::back_inserter(conditions.setup));
-    conditions.setup.push_back(check_ordinary_threads(control.id(), config->realtime));
-    const DisplayThread display{controller->cell(), head_lines(*controller, conditions)};
-    control.begin();
-    control.join();
-    service->loop_has_ended();
-  }
-  guard.let_go();
-  const int code = exit_code(*controller);
-  if (!resume && !controller->cell().has_driven()) {
-    discard_run(std::move(*folder));
-    return complain(why_refused(*controller)), code == exit_aborted ? exit_failed : code;
-  }
-  const RunLabel label{.plate = folder->names.plate,
-                       .seed = {},
-                       .begun = begun_of(*folder->store),
-                       .conditions = &conditions,
-                       .remark = folder->names.remark};
-  const Json summary = summary_of(*controller, label);
-  if (controller->recorder().store_failed())
-    complain(
-        fmt::format("{}; what came after that is not saved", controller->recorder().store_error().view()));
-  if (const auto written = write_results(*controller, *folder, label, summary); !written)
-    return complain(written.error().what);
-  if (code != exit_done) return complain(how_it_ended(*controller, options, out.string())), code;
-  fmt::print("{}{}", result_table(summary, out.string()), timing_lines(timing_of(*controller, &conditions)));
-  return controller->recorder().store_failed() ? exit_failed : exit_done;
+  RunConditions conditions = run_beside_threads(*controller, *config, *folder,
+                                                operator_socket ? &*operator_socket : nullptr, service);
+  signals.stops(nullptr);
+  conditions.unsaid_lines = unsaid();
+  return wind_up(*controller, std::move(*folder), options, resume, conditions);
 }
+
+namespace {
+
+// As it is told apart from other runs, whichever way it is named.
+std::string place_of(const std::string& run) {
+  std::error_code failed;
+  const auto place = std::filesystem::canonical(run, failed);
+  return failed ? run : place.string();
+}
+
+// Made, or there already: empty, with somebody's other files, or with an earlier fit of the same run. What another
+// run or its fit has left is not written over.
+std::expected<RunFolder, RunError> folder_for_fit(const FitOptions& options) {
+  const std::filesystem::path out{options.out};
+  const auto refused = [&](std::string_view why) {
+    return std::unexpected{RunError{fmt::format("{}: {}", options.out, why)}};
+  };
+  std::error_code failed;
+  if (std::filesystem::equivalent(options.run, out, failed))
+    return refused("is the run itself; give another folder with --out");
+  failed.clear();
+  std::filesystem::create_directories(out, failed);
+  if (failed) return refused(fmt::format("cannot be created ({})", failed.message()));
+  auto claim = FolderClaim::take(out);
+  if (!claim) return std::unexpected{claim.error()};
+  const auto before = read_json(out / "summary.json");
+  const bool is_ours = before && before->is_object() && before->contains("fitted_from") &&
+                       (*before)["fitted_from"] == place_of(options.run);
+  if (!options.force && (holds_run(out) || (holds_results(out) && !is_ours)))
+    return refused("holds another run's results; give another --out, or --force to write over them");
+  return RunFolder{.path = out, .claim = std::move(*claim), .store = nullptr, .archive = nullptr};
+}
+
+}  // namespace
 
 int fit_run(const FitOptions& options) {
   auto run = open_run(options.run);
@@ -287,20 +341,16 @@ int fit_run(const FitOptions& options) {
   run_to_rest(*controller);
   const RunLabel label{
       .plate = run->names.plate, .seed = {}, .begun = begun_of(*run->store), .remark = run->names.remark};
-  const Json summary = summary_of(*controller, label);
-  std::error_code failed;
-  if (std::filesystem::equivalent(options.run, options.out, failed)) {
-    return complain(fmt::format("{}: is the run itself; give another folder with --out", options.out));
-  }
-  failed.clear();
-  std::filesystem::create_directories(options.out, failed);
-  if (failed) return complain(fmt::format("{}: cannot be created ({})", options.out, failed.message()));
-  RunFolder results{options.out, std::move(run->store), nullptr};
-  if (const auto written = write_results(*controller, results, label, summary); !written)
+  Json summary = summary_of(*controller, label);
+  summary["fitted_from"] = place_of(options.run);
+  auto results = folder_for_fit(options);
+  if (!results) return complain(results.error().what);
+  results->store = std::move(run->store);
+  if (const auto written = write_results(*controller, *results, label, summary); !written)
     return complain(written.error().what);
   if (const int code = exit_code(*controller); code != exit_done)
     return complain(controller->cell().why().view()), code;
-  fmt::print("{}", result_table(summary, options.out));
+  show(result_table(summary, options.out));
   return exit_done;
 }
 

@@ -35,8 +35,9 @@ struct RunOptions {
 int run_cell(const RunOptions&);
 
 struct FitOptions {
-  std::string run;  // a run's folder; read only
-  std::string out;  // where the results go; must not be the run itself
+  std::string run;     // a run's folder; read only
+  std::string out;     // where the results go; must not be the run itself
+  bool force = false;  // even over another run's results
 };
 int fit_run(const FitOptions&);
 

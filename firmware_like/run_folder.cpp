@@ -1,8 +1,12 @@
 #include "firmware_like/run_folder.hpp"
 
+#include <fcntl.h>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <ctime>
 
 #include "firmware_like/build_info.hpp"
@@ -36,23 +40,79 @@ std::expected<void, RunError> remove_simulated(const fs::path& folder) {
   return {};
 }
 
+// out/run-YYYYmmdd-HHMMSS, made by us and by nobody else: two runs of one second get two.
+std::expected<fs::path, RunError> make_new_folder() {
+  std::error_code failed;
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  ::localtime_r(&now, &local);
+  const fs::path first = fs::path{"out"} / fmt::format("run-{:%Y%m%d-%H%M%S}", local);
+  fs::create_directories(first.parent_path(), failed);
+  constexpr int most_of_a_second = 1000;
+  fs::path path = first;
+  for (int n = 2; !failed && n <= most_of_a_second; ++n) {
+    if (fs::create_directory(path, failed)) return path;
+    path = first.string() + fmt::format("-{}", n);
+  }
+  return error(fmt::format("{}: cannot be created ({}); give another place with --out", path.string(),
+                           failed.message()));
+}
+
 }  // namespace
+
+std::expected<FolderClaim, RunError> FolderClaim::take(const fs::path& path) {
+  auto claim = hal::claim_folder(path.string());
+  if (!claim) return error(claim.error());
+  FolderClaim taken;
+  taken.claim_ = std::move(*claim);
+  taken.folder_ = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  // A file system without such locks is no reason not to measure.
+  if (taken.folder_ >= 0 && ::flock(taken.folder_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    return error(fmt::format("{} is in use by another program (process {}): wait for its end, or stop it",
+                             path.string(), hal::process_with_lock(taken.folder_)));
+  return taken;
+}
+
+FolderClaim::~FolderClaim() {
+  if (folder_ >= 0) ::close(folder_);
+}
 
 std::string now_utc() {
   const std::time_t now = std::time(nullptr);
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", *std::gmtime(&now));
 }
 
-bool holds_run(const fs::path& path) { return fs::exists(store_path(path)); }
+bool holds_run(const fs::path& path) {
+  std::error_code failed;
+  return fs::exists(store_path(path), failed);
+}
 
-std::expected<RunFolder, RunError> create_run(const fs::path& path, const std::string& config_text,
+bool holds_results(const fs::path& path) {
+  std::error_code failed;
+  return fs::exists(path / "summary.json", failed) || fs::exists(path / "surface.json", failed);
+}
+
+std::expected<RunFolder, RunError> create_run(const fs::path& asked, const std::string& config_text,
                                               RunKind kind, const RunNames& names) {
   std::error_code failed;
-  const bool made_folder = fs::create_directories(path, failed);
+  fs::path path = asked;
+  bool made_folder = true;
+  if (asked.empty()) {
+    auto made = make_new_folder();
+    if (!made) return std::unexpected{made.error()};
+    path = std::move(*made);
+  } else {
+    made_folder = fs::create_directories(path, failed);
+  }
   if (failed)
     return error(
         fmt::format("{}: cannot be created ({}); give another --out", path.string(), failed.message()));
-  if (fs::exists(store_path(path))) {
+  auto claim = FolderClaim::take(path);
+  if (!claim) return std::unexpected{claim.error()};
+  if (!holds_run(path) && holds_results(path)) {
+    return error(fmt::format("{}: holds results whose run is not there; give another --out", path.string()));
+  }
+  if (holds_run(path)) {
     if (kind != RunKind::simulated) {
       return error(fmt::format("{}: holds a run already; give another --out, or --resume to go on with it",
                                path.string()));
@@ -60,7 +120,10 @@ std::expected<RunFolder, RunError> create_run(const fs::path& path, const std::s
     if (auto removed = remove_simulated(path); !removed) return std::unexpected{removed.error()};
   }
   auto store = hal::RunStore::open(store_path(path), hal::RunStore::Mode::create);
-  if (!store) return error(store.error().what);
+  if (!store) {
+    if (made_folder) fs::remove(path, failed);
+    return error(store.error().what);
+  }
   std::vector<std::pair<std::string, std::string>> about = {{"kind", kind_name(kind)},
                                                             {"config", config_text},
                                                             {"version", std::string{build_info().version}},
@@ -74,7 +137,8 @@ std::expected<RunFolder, RunError> create_run(const fs::path& path, const std::s
   for (const auto& [key, value] : about) {
     if (auto written = store->set_meta(key, value); !written) return error(written.error().what);
   }
-  return RunFolder{path, std::make_unique<hal::RunStore>(std::move(*store)), nullptr, made_folder, kept};
+  return RunFolder{path,    std::move(*claim), std::make_unique<hal::RunStore>(std::move(*store)),
+                   nullptr, made_folder,       kept};
 }
 
 void discard_run(RunFolder run) {
@@ -85,10 +149,27 @@ void discard_run(RunFolder run) {
   if (run.made_folder) fs::remove(run.path, not_empty);
 }
 
+std::expected<bool, RunError> bring_back(const RunFolder& run) {
+  if (holds_run(run.path)) return false;
+  std::error_code failed;
+  fs::create_directories(run.path, failed);
+  if (failed) {
+    return error(fmt::format("{}: was removed during the run and cannot be made again ({})",
+                             run.path.string(), failed.message()));
+  }
+  remove_store(run.path);  // a log that is left alone would be taken for the new file's
+  if (auto saved = run.store->save_copy(store_path(run.path)); !saved) return error(saved.error().what);
+  return true;
+}
+
 std::expected<RunFolder, RunError> resume_run(const fs::path& path, const std::string& config_text,
                                               const RunNames& names) {
+  std::expected<FolderClaim, RunError> claim;
+  if (holds_run(path)) claim = FolderClaim::take(path);
+  if (!claim) return std::unexpected{claim.error()};
   auto opened = open_run(path);
   if (!opened) return opened;
+  opened->claim = std::move(*claim);
   const auto config = opened->store->meta("config");
   if (!config) return error(config.error().what);
   // The stored shots lead to the same places only if everything that places are computed from is as it was.
@@ -127,7 +208,7 @@ std::expected<RunFolder, RunError> resume_run(const fs::path& path, const std::s
 }
 
 std::expected<RunFolder, RunError> open_run(const fs::path& path) {
-  if (!fs::exists(store_path(path))) {
+  if (!holds_run(path)) {
     return error(fmt::format("{}: no run.db there; give the folder of a run", path.string()));
   }
   auto store = hal::RunStore::open(store_path(path), hal::RunStore::Mode::read);
@@ -135,13 +216,12 @@ std::expected<RunFolder, RunError> open_run(const fs::path& path) {
   auto shots = StoredShots::load(*store);
   if (!shots) return error(shots.error().what);
   RunNames names{store->meta("plate").value_or(name_of_folder(path)), store->meta("remark").value_or("")};
-  return RunFolder{path, std::make_unique<hal::RunStore>(std::move(*store)),
-                   std::make_unique<StoredShots>(std::move(*shots)), false, std::move(names)};
-}
-
-fs::path default_run_path() {
-  const std::time_t now = std::time(nullptr);
-  return fs::path{"out"} / fmt::format("run-{:%Y%m%d-%H%M%S}", *std::localtime(&now));
+  return RunFolder{path,
+                   {},
+                   std::make_unique<hal::RunStore>(std::move(*store)),
+                   std::make_unique<StoredShots>(std::move(*shots)),
+                   false,
+                   std::move(names)};
 }
 
 }  // namespace moldloft::firmware_like

@@ -9,8 +9,10 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "firmware_like/shot_files.hpp"
+#include "hal/claim.hpp"
 #include "hal/run_store.hpp"
 
 namespace moldloft::firmware_like {
@@ -24,8 +26,29 @@ struct RunNames {
   std::string plate, remark;  // empty: not given
 };
 
+// One process writes to a run's folder, on this machine and in containers that share it. Reading is free: the store
+// shows a reader what has been committed, while a run goes on too.
+class FolderClaim {
+ public:
+  FolderClaim() = default;
+  static std::expected<FolderClaim, RunError> take(const std::filesystem::path&);
+  FolderClaim(FolderClaim&& other) noexcept
+      : claim_{std::move(other.claim_)}, folder_{std::exchange(other.folder_, -1)} {}
+  FolderClaim& operator=(FolderClaim&& other) noexcept {
+    std::swap(claim_, other.claim_);
+    std::swap(folder_, other.folder_);
+    return *this;
+  }
+  ~FolderClaim();
+
+ private:
+  hal::Claim claim_;
+  int folder_ = -1;
+};
+
 struct RunFolder {
   std::filesystem::path path;
+  FolderClaim claim;  // while it is written to; none when it is only read
   std::unique_ptr<hal::RunStore> store;
   std::unique_ptr<StoredShots> archive;  // resumed: the shots that are there already
   bool made_folder = false;              // it was not there before
@@ -34,6 +57,7 @@ struct RunFolder {
 
 enum class RunKind { measured, simulated };
 
+// An empty path stands for a new folder under out/, named by the time.
 std::expected<RunFolder, RunError> create_run(const std::filesystem::path&, const std::string& config_text,
                                               RunKind, const RunNames& = {});
 // Goes on under the name that the run has: another one is refused. A remark is added to the one that is there.
@@ -41,12 +65,16 @@ std::expected<RunFolder, RunError> resume_run(const std::filesystem::path&, cons
                                               const RunNames& = {});
 std::expected<RunFolder, RunError> open_run(const std::filesystem::path&);  // to read only
 
+// Whoever removed the run's folder or its store while the store was open has not removed what is in it: both are made
+// again. Whether that was needed.
+std::expected<bool, RunError> bring_back(const RunFolder&);
+
 // Takes a run away that was refused before anything was measured, so that it does not block the next try: its
 // store, and the folder if it was made for it and holds nothing else.
 void discard_run(RunFolder);
 
 bool holds_run(const std::filesystem::path&);
-std::string now_utc();                     // "2026-01-31T12:00:00Z"
-std::filesystem::path default_run_path();  // out/run-YYYYmmdd-HHMMSS
+bool holds_results(const std::filesystem::path&);  // of a run, or of a fit
+std::string now_utc();                             // "2026-01-31T12:00:00Z"
 
 }  // namespace moldloft::firmware_like

@@ -1,6 +1,7 @@
 #include "hal/run_store.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -73,7 +74,7 @@ StoreError error_of(int code, const std::string& path, std::string_view detail) 
 }
 
 // A name may hold what a URI gives a meaning to.
-std::string uri_of(const std::string& path, bool immutable) {
+std::string uri_of(const std::string& path) {
   std::string uri = "file:";
   for (const char c : path) {
     if (c == '%' || c == '?' || c == '#') {
@@ -82,7 +83,30 @@ std::string uri_of(const std::string& path, bool immutable) {
       uri += c;
     }
   }
-  return uri + (immutable ? "?immutable=1" : "");
+  return uri;
+}
+
+// How a store is read in a folder that cannot be written (a read-only disk, another user's folder), where SQLite cannot
+// make the files that it shares with a writer. What a crashed or running program has committed last stands in the
+// write-ahead log beside it, and belongs to the run.
+struct ReadingWay {
+  const char* options = "";
+  bool index_in_memory = false;
+};
+
+std::expected<ReadingWay, StoreError> way_to_read(const std::string& path) {
+  const std::string log = path + "-wal", index = path + "-shm";
+  struct stat what {};
+  if (::stat(log.c_str(), &what) != 0 || what.st_size == 0) return ReadingWay{"?immutable=1"};
+  for (const auto& part : {path, log}) {
+    if (::access(part.c_str(), R_OK) == 0) continue;
+    return std::unexpected{
+        StoreError{part + ": cannot be read, and belongs to the run: check its permissions"}};
+  }
+  // A writer that lives has its index beside the log, and SQLite reads it there. Without one nobody writes, and the
+  // index of the log is made in memory.
+  if (::access(index.c_str(), R_OK) == 0) return ReadingWay{};
+  return ReadingWay{"?vfs=unix-none", true};
 }
 
 void bind_pose(Statement& to, const Pose& pose) {
@@ -201,16 +225,21 @@ std::expected<RunStore, StoreError> RunStore::open(const std::string& path, Mode
   }
   if (mode != Mode::create && !exists) return std::unexpected{StoreError{path + ": there is no such file"}};
 
-  // In a folder that cannot be written SQLite cannot keep its lock files: nobody else can write there either.
-  const bool immutable = mode == Mode::read && !folder_writable;
+  const std::expected<ReadingWay, StoreError> way =
+      mode == Mode::read && !folder_writable ? way_to_read(path) : ReadingWay{};
+  if (!way) return std::unexpected{way.error()};
   const int access = mode == Mode::read ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE;
   const int create = mode == Mode::create ? SQLITE_OPEN_CREATE : 0;
   sqlite3* handle = nullptr;
-  const int code = sqlite3_open_v2(uri_of(path, immutable).c_str(), &handle,
+  const int code = sqlite3_open_v2((uri_of(path) + way->options).c_str(), &handle,
                                    access | create | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
   auto database = std::make_unique<Database>(path, handle);
   if (code != SQLITE_OK) return std::unexpected{database->error(code)};
   sqlite3_busy_timeout(handle, busy_timeout_ms);
+  if (way->index_in_memory) {
+    if (auto alone = database->run("PRAGMA locking_mode = EXCLUSIVE"); !alone)
+      return std::unexpected{alone.error()};
+  }
 
   Result ready = mode == Mode::create ? database->create_tables() : database->check_tables();
   if (ready && mode != Mode::read) ready = database->prepare_writing();
@@ -280,6 +309,14 @@ Result RunStore::write(const ShotRecord& record) {
 Result RunStore::set_meta(std::string_view key, std::string_view value) {
   database_->meta_in.bind(key).bind(value);
   return database_->insert(database_->meta_in);
+}
+
+Result RunStore::save_copy(const std::string& path) const {
+  Statement copy{database_->handle, "VACUUM INTO ?"};
+  const std::string uri = uri_of(path);
+  const int code = copy.bind(std::string_view{uri}).step();
+  if (code != SQLITE_DONE) return std::unexpected{error_of(code, path, sqlite3_errmsg(database_->handle))};
+  return {};
 }
 
 // ---- reading

@@ -44,6 +44,9 @@ class RunStore {
   void roll_back() noexcept;  // of what begin() began; nothing if nothing did
   std::expected<void, StoreError> set_meta(std::string_view key, std::string_view value);
 
+  // All that is committed, in a new file; also when the store's own file has been removed meanwhile.
+  std::expected<void, StoreError> save_copy(const std::string& path) const;
+
   // ---- reading
   std::expected<std::string, StoreError> meta(std::string_view key) const;
   std::expected<std::vector<ShotRecord>, StoreError> shots() const;

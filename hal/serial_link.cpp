@@ -1,11 +1,16 @@
 #include "hal/serial_link.hpp"
 
+#include "hal/claim.hpp"
 #include "hal/fixed_text.hpp"
 #include "hal/realtime.hpp"
 #include "hal/realtime_section.hpp"
 
 #include <libserialport.h>
 #include <poll.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -81,20 +86,38 @@ class SerialLink final : public ByteLink {
     }
     if (sp_open(port_, SP_MODE_READ_WRITE) != SP_OK) {
       const int error = sp_last_error_code();
-      lose("{} cannot be opened: {}", device_, error == 0 ? "not a serial port" : strerrordesc_np(error));
+      lose("{} cannot be opened: {}", device_,
+           error == EBUSY ? "another program has it for itself"
+           : error == 0   ? "not a serial port"
+                          : strerrordesc_np(error));
       return;
     }
     is_open_ = true;
-    if (!configure()) return;
     int handle = -1;
     if (sp_get_port_handle(port_, &handle) != SP_OK || handle < 0) {
       lose("{} gives no handle", device_);
       return;
     }
     handle_ = handle;
+    if (!is_ours_alone() || !configure()) return;
     sp_flush(port_, SP_BUF_BOTH);  // what lay in the buffers belongs to an earlier life
     state_ = LinkState::open;
     why_ = "";
+  }
+
+  // Two programs on one line garble each other's commands. The lock is for those who ask for one; the exclusive mode
+  // keeps out those who do not. It would outlive us on a pseudo-terminal, whose other end stays open.
+  bool is_ours_alone() {
+    if (::flock(handle_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+      lose("{} is in use by another program (process {}): end it there", device_, process_with_lock(handle_));
+      return false;
+    }
+    struct stat port {};
+    constexpr unsigned first_pseudo_terminal = 136, last_pseudo_terminal = 143;  // major numbers of Linux
+    const bool known = ::fstat(handle_, &port) == 0;
+    const unsigned kind = known ? major(port.st_rdev) : first_pseudo_terminal;
+    if (kind < first_pseudo_terminal || kind > last_pseudo_terminal) ::ioctl(handle_, TIOCEXCL);
+    return true;
   }
 
   // libserialport says "device not found" for whatever it dislikes; the file system knows better.

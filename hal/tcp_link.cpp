@@ -197,6 +197,16 @@ class TcpLink final : public ByteLink {
 
 bool is_known_host(const std::string& host) { return find_address(host).has_value(); }
 
+std::string tcp_address(const std::string& host) {
+  auto address = find_address(host);
+  if (!address) return {};
+  if (address->is_v6() && address->to_v6().is_v4_mapped())
+    address = asio::ip::make_address_v4(asio::ip::v4_mapped, address->to_v6());
+  // Connecting to no address in particular leads to the machine itself.
+  if (*address == asio::ip::address_v4::any()) address = asio::ip::address_v4::loopback();
+  return address->to_string();
+}
+
 std::unique_ptr<ByteLink> make_tcp_link(std::string host, std::uint16_t port) {
   return std::make_unique<TcpLink>(std::move(host), port);
 }

@@ -13,6 +13,9 @@
 
 namespace moldloft::hal {
 
+// The address that a host's name leads to, in numbers: one text for one address. Empty: it leads nowhere.
+std::string tcp_address(const std::string& host);
+
 std::unique_ptr<ByteLink> make_tcp_link(std::string host, std::uint16_t port);
 
 // Whether open() would find an address for this host. Blocking: reads the hosts file.

@@ -12,9 +12,14 @@
 #include <thread>
 #include <vector>
 
+#include "firmware_like/console.hpp"
 #include "host_sim/simulated_run.hpp"
 
 namespace moldloft::host_sim {
+
+using firmware_like::flush_shown;
+using firmware_like::say;
+using firmware_like::show;
 namespace {
 
 using firmware_like::Json;
@@ -96,21 +101,21 @@ Row run_job(const CampaignOptions& options, const Job& job, const std::filesyste
 }
 
 void print_row(const Row& r) {
-  fmt::print("{:<10}{:<15}{:>5}  {:<10}", r.job.plate, r.job.outline_name, r.job.seed, r.result);
+  show(fmt::format("{:<10}{:<15}{:>5}  {:<10}", r.job.plate, r.job.outline_name, r.job.seed, r.result));
   if (r.truth.empty()) {
-    fmt::print("  {}\n", r.message);
+    show(fmt::format("  {}\n", r.message));
     return;
   }
-  fmt::print("{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}{}\n", number(r.truth, "normal_rms_mm"),
-             number(r.truth, "normal_max_mm"), number(r.truth, "outline_max_mm"),
-             number(r.truth, "corner_max_mm"), r.good ? "" : "  beyond the limits");
+  show(fmt::format("{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}{}\n", number(r.truth, "normal_rms_mm"),
+                   number(r.truth, "normal_max_mm"), number(r.truth, "outline_max_mm"),
+                   number(r.truth, "corner_max_mm"), r.good ? "" : "  beyond the limits"));
 }
 
 void print_summary(const std::vector<Row>& rows) {
   const auto complete =
       std::count_if(rows.begin(), rows.end(), [](const Row& r) { return r.result == "complete"; });
   const auto good = std::count_if(rows.begin(), rows.end(), [](const Row& r) { return r.good; });
-  fmt::print("{} runs, {} complete, {} within the limits\n", rows.size(), complete, good);
+  show(fmt::format("{} runs, {} complete, {} within the limits\n", rows.size(), complete, good));
   for (const auto& [key, limit] : {std::pair{"normal_rms_mm", max_normal_rms_mm},
                                    {"normal_max_mm", max_normal_max_mm},
                                    {"outline_max_mm", max_outline_mm},
@@ -120,8 +125,8 @@ void print_summary(const std::vector<Row>& rows) {
       worst = std::max(worst, number(r.truth, key));
       sum += number(r.truth, key);
     }
-    fmt::print("{:<16} mean {:>8.4f}  worst {:>8.4f}  limit {:>6.2f}\n", key,
-               sum / static_cast<double>(std::max<std::ptrdiff_t>(complete, 1)), worst, limit);
+    show(fmt::format("{:<16} mean {:>8.4f}  worst {:>8.4f}  limit {:>6.2f}\n", key,
+                     sum / static_cast<double>(std::max<std::ptrdiff_t>(complete, 1)), worst, limit));
   }
 }
 
@@ -130,10 +135,10 @@ void print_summary(const std::vector<Row>& rows) {
 int run_campaign(const CampaignOptions& options) {
   const auto jobs = jobs_for(options);
   if (jobs.empty()) {
-    fmt::print(stderr,
-               "moldloft-sim campaign: nothing to run; --plates all or one of {}; --outlines all or one of "
-               "{}; --seeds A..B\n",
-               fmt::join(shape_names(), ", "), fmt::join(outline_names(), ", "));
+    say(fmt::format(
+        "moldloft-sim campaign: nothing to run; --plates all or one of {}; --outlines all or one of "
+        "{}; --seeds A..B\n",
+        fmt::join(shape_names(), ", "), fmt::join(outline_names(), ", ")));
     return 1;
   }
   const bool keep = !options.out.empty();
@@ -146,8 +151,8 @@ int run_campaign(const CampaignOptions& options) {
   std::mutex printing;
   std::size_t printed = 0;
   if (!options.json) {
-    fmt::print("{:<10}{:<15}{:>5}  {:<10}{:>10}{:>10}{:>10}{:>10}\n", "plate", "outline", "seed", "result",
-               "rms mm", "max mm", "outline", "corner");
+    show(fmt::format("{:<10}{:<15}{:>5}  {:<10}{:>10}{:>10}{:>10}{:>10}\n", "plate", "outline", "seed",
+                     "result", "rms mm", "max mm", "outline", "corner"));
   }
   const auto work = [&] {
     for (std::size_t i = next++; i < jobs.size(); i = next++) {
@@ -158,7 +163,7 @@ int run_campaign(const CampaignOptions& options) {
       // Rows appear in the order of the table, whichever run ends first.
       for (; !options.json && printed < rows.size() && ready[printed]; ++printed) {
         print_row(rows[printed]);
-        std::fflush(stdout);
+        flush_shown();
       }
     }
   };
@@ -177,7 +182,7 @@ int run_campaign(const CampaignOptions& options) {
                      {"result", r.result},
                      {"truth", r.truth}});
     }
-    fmt::print("{}\n", all.dump(1));
+    show(fmt::format("{}\n", all.dump(1)));
   } else {
     print_summary(rows);
   }

@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <fstream>
 
 #include "tasks/tool_pose.hpp"
 
 namespace moldloft::host_sim {
 namespace {
+
+constexpr std::string_view first_words = "# A simulated cell with a ";
 
 // A margin and a round number, as a person would put it.
 double roomy(double length_mm) { return std::ceil(length_mm * 1.1 / 50) * 50; }
@@ -32,14 +35,19 @@ std::string workspace(const CellDescription& d) {
 
 }  // namespace
 
+bool is_generated_cell(const std::string& path) {
+  std::ifstream file{path};
+  std::string first;
+  return std::getline(file, first) && first.starts_with(first_words);
+}
+
 std::string cell_toml(const CellDescription& d, const PlateInstance& plate, const CellAddresses& addresses) {
   const auto world_from_scanner = tasks::motion_of(start_pose(d)) * nominal_mount();
   const Eigen::Vector3d centre = world_from_scanner.translation();
   const Eigen::Vector3d axis = world_from_scanner.linear().col(0);
   const Eigen::Vector2d size = plate.plate->bounds().max - plate.plate->bounds().min;
-  std::string t =
-      fmt::format("# A simulated cell with a {0} arm.\nschema = 1\n\n[cell]\nname = \"simulated {0} cell\"\n",
-                  d.arm == ArmKind::gantry ? "gantry" : "SCARA");
+  std::string t = fmt::format("{1}{0} arm.\nschema = 1\n\n[cell]\nname = \"simulated {0} cell\"\n",
+                              d.arm == ArmKind::gantry ? "gantry" : "SCARA", first_words);
   t += fmt::format(
       "\n[scanner]\nhost = \"127.0.0.1\"\nport = {}\nmax_stripes = {}\nmax_points_per_stripe = {}\nfield_mm "
       "= [{}, {}]\nnoise_mm = {}\ndepth_mm = {}\n",

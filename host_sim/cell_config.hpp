@@ -16,6 +16,9 @@ struct CellAddresses {
   std::string robot_device = "/dev/ttyS0";
 };
 
+// Whether the file there is one of those, and may be written over.
+bool is_generated_cell(const std::string& path);
+
 std::string cell_toml(const CellDescription&, const PlateInstance&, const CellAddresses& = {});
 
 }  // namespace moldloft::host_sim

@@ -5,10 +5,10 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 
+#include "firmware_like/console.hpp"
 #include "firmware_like/controller.hpp"
 #include "firmware_like/results.hpp"
 #include "hal/cable.hpp"
@@ -17,6 +17,10 @@
 #include "host_sim/world_clock.hpp"
 
 namespace moldloft::host_sim {
+
+using firmware_like::flush_shown;
+using firmware_like::say;
+using firmware_like::show;
 namespace {
 
 namespace fs = std::filesystem;
@@ -188,18 +192,18 @@ std::expected<Day, SimError> run_day(const DayOptions& options) {
 namespace {
 
 void print_head() {
-  fmt::print("{:>6} {:>7} {:>10} {:>7} {:>8} {:>8} {:>5} {:>10} {:>10} {:>13} {:>8} {:>8} {:>10}\n", "hours",
-             "plates", "ticks", "missed", "off beat", "shots", "lost", "stored MB", "heap KiB",
-             "resident KiB", "handles", "threads", "worst mm");
+  show(fmt::format("{:>6} {:>7} {:>10} {:>7} {:>8} {:>8} {:>5} {:>10} {:>10} {:>13} {:>8} {:>8} {:>10}\n",
+                   "hours", "plates", "ticks", "missed", "off beat", "shots", "lost", "stored MB", "heap KiB",
+                   "resident KiB", "handles", "threads", "worst mm"));
 }
 
 void print_row(const DayRow& r) {
-  fmt::print(
+  show(fmt::format(
       "{:>6.2f} {:>7} {:>10} {:>7} {:>5} ns {:>8} {:>5} {:>10.1f} {:>10} {:>13} {:>8} {:>8} {:>10.4f}\n",
       r.hours, r.plates, r.ticks, r.missed, r.off_beat_ns, r.shots, r.recorder_lost,
       static_cast<double>(r.recorded_bytes) * 1e-6, r.heap_bytes / 1024, r.resident_bytes / 1024, r.handles,
-      r.threads, r.worst_normal_mm);
-  std::fflush(stdout);
+      r.threads, r.worst_normal_mm));
+  flush_shown();
 }
 
 }  // namespace
@@ -212,15 +216,16 @@ int show_day(const DayOptions& asked) {
   }
   const auto day = run_day(options);
   if (!day) {
-    fmt::print(stderr, "moldloft-sim day: {}\n", day.error().what);
+    say(fmt::format("moldloft-sim day: {}\n", day.error().what));
     return 1;
   }
   if (options.json) {
-    fmt::print("{}\n", json_of(*day).dump(2));
+    show(fmt::format("{}\n", json_of(*day).dump(2)));
   } else {
-    fmt::print("{}\n",
-               day->flat ? "flat: heap, handles and threads as after the first row, nothing lost, on the beat"
-                         : "NOT flat");
+    show(fmt::format("{}\n",
+                     day->flat
+                         ? "flat: heap, handles and threads as after the first row, nothing lost, on the beat"
+                         : "NOT flat"));
   }
   return day->flat ? 0 : 1;
 }

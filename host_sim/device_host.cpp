@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <csignal>
-#include <cstdio>
 
+#include "firmware_like/console.hpp"
 #include "firmware_like/results.hpp"
 #include "hal/cable.hpp"
 #include "hal/serial_link.hpp"
@@ -17,6 +17,10 @@
 
 namespace moldloft::host_sim {
 
+using firmware_like::flush_shown;
+using firmware_like::say;
+using firmware_like::show;
+
 namespace {
 
 constexpr hal::Duration step_time = std::chrono::milliseconds{1};
@@ -25,7 +29,7 @@ volatile std::sig_atomic_t asked_to_end = 0;
 void ask_to_end(int) { asked_to_end = 1; }
 
 int failed(const SimError& error) {
-  fmt::print(stderr, "moldloft-sim devices: {}\n", error.what);
+  say(fmt::format("moldloft-sim devices: {}\n", error.what));
   return 1;
 }
 
@@ -34,6 +38,7 @@ void catch_signals() {
   action.sa_handler = ask_to_end;
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
+  ::sigaction(SIGHUP, &action, nullptr);
 }
 
 // The robot's end of the line, and the device by which the controller reaches the other end.
@@ -59,19 +64,24 @@ std::expected<RobotLine, SimError> robot_line(const DeviceOptions& options) {
 // What the arm and the laser were made to do, as it happens: whoever tests a controller sees what moved, and when.
 class DeviceLog {
  public:
-  void look(SimulatedWorld& world, hal::Instant since_start) {
+  void look(SimulatedWorld& world, hal::Instant now, hal::Instant since_start) {
     const auto motions = world.robot().counters().motions;
     const auto exposures = world.scanner().counters().exposures;
     if (motions != motions_) line("motion", motions_ = motions, since_start);
+    if (const bool moves = world.robot().drive().moving(now); moves != moves_) {
+      moves_ = moves;
+      line(moves ? "moves" : "stands", motions, since_start);
+    }
     if (exposures != exposures_) line("exposure", exposures_ = exposures, since_start);
   }
 
  private:
   static void line(const char* what, std::uint64_t number, hal::Instant at) {
-    fmt::print("{} {} at {:.3f} s\n", what, number, std::chrono::duration<double>(at).count());
-    std::fflush(stdout);
+    show(fmt::format("{} {} at {:.3f} s\n", what, number, std::chrono::duration<double>(at).count()));
+    flush_shown();
   }
   std::uint64_t motions_ = 0, exposures_ = 0;
+  bool moves_ = false;
 };
 
 }  // namespace
@@ -89,7 +99,10 @@ int run_devices(const DeviceOptions& options) {
 
   if (!options.cell_toml.empty()) {
     const CellAddresses here{.scanner_port = scanner_port, .robot_device = robot->controllers_device};
-    const auto written = firmware_like::write_file(options.cell_toml, cell_toml(options.cell, *plate, here));
+    const bool ours = options.force || is_generated_cell(options.cell_toml);
+    const auto written =
+        firmware_like::write_file(options.cell_toml, cell_toml(options.cell, *plate, here),
+                                  ours ? firmware_like::Existing::replaced : firmware_like::Existing::kept);
     if (!written) return failed({written.error().what});
   }
 
@@ -98,9 +111,9 @@ int run_devices(const DeviceOptions& options) {
   PacedLink scanner_wire{std::move(*scanner), clock, hal::Cable::Settings{}.bytes_per_second};
   PacedLink robot_wire{std::move(robot->link), clock, serial_bytes_per_second};
   SimulatedWorld world(options.cell, *plate, scanner_wire, robot_wire);
-  fmt::print("ready: scanner 127.0.0.1:{} robot {} plate {} seed {}\n", scanner_port, robot->served_on,
-             plate->plate->name(), options.cell.seed);
-  std::fflush(stdout);
+  show(fmt::format("ready: scanner 127.0.0.1:{} robot {} plate {} seed {}\n", scanner_port, robot->served_on,
+                   plate->plate->name(), options.cell.seed));
+  flush_shown();
 
   const hal::Instant began = clock.now();
   hal::Instant next = began;
@@ -108,14 +121,15 @@ int run_devices(const DeviceOptions& options) {
   while (asked_to_end == 0) {
     const hal::Instant now = clock.now();
     world.step(now);
-    if (options.log) log.look(world, now - began);
+    if (options.log) log.look(world, now, now - began);
     next = std::max(next + step_time, now);  // casting a frame takes several steps: they are not caught up
     clock.sleep_until(next);
   }
   const auto times = world.times();
-  fmt::print("ended: {} motions, {} exposures, {:.1f} s from first command to last done, idle {:.1f} %\n",
-             world.robot().counters().motions, world.scanner().counters().exposures,
-             std::chrono::duration<double>(times.total).count(), 100 * times.idle_fraction());
+  show(fmt::format(
+      "ended: {} motions, {} exposures, {:.1f} s from first command to last done, idle {:.1f} %\n",
+      world.robot().counters().motions, world.scanner().counters().exposures,
+      std::chrono::duration<double>(times.total).count(), 100 * times.idle_fraction()));
   return 0;
 }
 

@@ -15,8 +15,9 @@ struct DeviceOptions {
   std::string robot_serial;  // a serial port instead of the pseudo-terminal; empty: none
   std::string controller_serial =
       "/dev/ttyS0";       // the controller's port, at the other end of that one's cable
-  bool log = false;       // a line for each motion that begins and each exposure
+  bool log = false;       // a line for each motion that begins and ends and each exposure
   std::string cell_toml;  // where to write a configuration that fits these devices; empty: nowhere
+  bool force = false;     // even over a file that this program has not written
 };
 
 // Prints one line when both devices can be reached, serves until SIGINT or SIGTERM, and lets clients come and

@@ -5,11 +5,11 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <optional>
 
 #include "firmware_like/surface_file.hpp"
+#include "firmware_like/whole_file.hpp"
 #include "host_sim/plan_polygon.hpp"
 
 namespace moldloft::host_sim {
@@ -173,9 +173,8 @@ std::expected<Verdict, SimError> judge_run(const std::string& folder, const Plat
                          {"normal_rms_mm", verdict->normal_rms_mm},
                          {"outline_max_mm", verdict->outline_max_mm},
                          {"corner_max_mm", verdict->corner_max_mm}};
-  std::ofstream file(path);
-  file << summary->dump(2) << '\n';
-  if (!file.flush()) return std::unexpected(SimError{path + ": cannot be written"});
+  if (const auto written = firmware_like::write_file(path, summary->dump(2) + "\n"); !written)
+    return std::unexpected(SimError{written.error().what});
   return verdict;
 }
 

@@ -3,10 +3,11 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
+#include <sstream>
 
 #include "firmware_like/build_info.hpp"
 #include "firmware_like/command_line.hpp"
+#include "firmware_like/console.hpp"
 #include "firmware_like/display.hpp"
 #include "firmware_like/plate_name.hpp"
 #include "firmware_like/run_command.hpp"
@@ -18,13 +19,15 @@
 #include "host_sim/simulated_run.hpp"
 
 using namespace moldloft::host_sim;
+using moldloft::firmware_like::say;
+using moldloft::firmware_like::show;
 
 namespace {
 
 // What was read of a mesh, and what was repaired of it.
 void say_remarks(const PlateInstance& place) {
   const auto& remarks = place.plate->remarks();
-  if (!remarks.empty()) fmt::print(stderr, "plate {}: {}\n", place.plate->name(), remarks);
+  if (!remarks.empty()) say(fmt::format("plate {}: {}\n", place.plate->name(), remarks));
 }
 
 int judge_command(const std::string& folder, const CellDescription& cell) {
@@ -32,39 +35,37 @@ int judge_command(const std::string& folder, const CellDescription& cell) {
   if (plate) say_remarks(*plate);
   const auto verdict = plate ? judge_run(folder, *plate) : std::unexpected(plate.error());
   if (!verdict) {
-    fmt::print(stderr, "moldloft-sim judge: {}\n", verdict.error().what);
+    say(fmt::format("moldloft-sim judge: {}\n", verdict.error().what));
     return 1;
   }
-  fmt::print("plate {} seed {}, {} points\n", cell.plate, cell.seed, verdict->points);
-  fmt::print("{:<24}{:>10.4f} mm\n", "truth.normal_max", verdict->normal_max_mm);
-  fmt::print("{:<24}{:>10.4f} mm\n", "truth.normal_rms", verdict->normal_rms_mm);
-  fmt::print("{:<24}{:>10.4f} mm\n", "truth.outline_max", verdict->outline_max_mm);
-  fmt::print("{:<24}{:>10.4f} mm\n", "truth.corner_max", verdict->corner_max_mm);
+  show(fmt::format("plate {} seed {}, {} points\n", cell.plate, cell.seed, verdict->points));
+  show(fmt::format("{:<24}{:>10.4f} mm\n", "truth.normal_max", verdict->normal_max_mm));
+  show(fmt::format("{:<24}{:>10.4f} mm\n", "truth.normal_rms", verdict->normal_rms_mm));
+  show(fmt::format("{:<24}{:>10.4f} mm\n", "truth.outline_max", verdict->outline_max_mm));
+  show(fmt::format("{:<24}{:>10.4f} mm\n", "truth.corner_max", verdict->corner_max_mm));
   return 0;
 }
 
 int cell_command(SimulatedRunOptions& options) {
-  if (options.out.empty()) options.out = moldloft::firmware_like::default_run_path();
   options.on_plate = say_remarks;
   const bool terminal = isatty(STDERR_FILENO) != 0;
   if (terminal) {
     options.on_progress = [](const moldloft::tasks::CellProgress& p) {
-      fmt::print(stderr, "\r\x1b[K{}", moldloft::firmware_like::progress_line(p));
-      std::fflush(stderr);
+      say(fmt::format("\r\x1b[K{}", moldloft::firmware_like::progress_line(p)));
     };
   }
   const auto run = simulate(options);
-  if (terminal && run) fmt::print(stderr, "\n");
+  if (terminal && run) say(fmt::format("\n"));
   if (!run) {
-    fmt::print(stderr, "moldloft-sim cell: {}\n", run.error().what);
+    say(fmt::format("moldloft-sim cell: {}\n", run.error().what));
     return 1;
   }
   if (run->exit_code != 0) {
-    fmt::print(stderr, "moldloft-sim cell: {}: {}\n", run->summary["result"].get<std::string>(),
-               run->summary["message"].get<std::string>());
+    say(fmt::format("moldloft-sim cell: {}: {}\n", run->summary["result"].get<std::string>(),
+                    run->summary["message"].get<std::string>()));
     return run->exit_code;
   }
-  fmt::print("{}", moldloft::firmware_like::result_table(run->summary, options.out.string()));
+  show(fmt::format("{}", moldloft::firmware_like::result_table(run->summary, run->folder.string())));
   return 0;
 }
 
@@ -119,7 +120,9 @@ void add_day_command(CLI::App& app, DayOptions& options) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+namespace {
+
+int run_command_line(int argc, char** argv) {
   CLI::App app{"The simulated cell of Moldloft", "moldloft-sim"};
   app.set_version_flag("--version", "moldloft-sim " + moldloft::firmware_like::version_text(),
                        "version, commit and compiler");
@@ -145,6 +148,7 @@ int main(int argc, char** argv) {
   devices_command->add_flag("--log", devices.log, "a line for each motion that begins and each exposure");
   devices_command->add_option("--cell", devices.cell_toml,
                               "write a configuration that fits these devices to this file");
+  devices_command->add_flag("--force", devices.force, "... even over one that was written by hand");
 
   SimulatedRunOptions run;
   add_cell_command(app, run);
@@ -166,4 +170,16 @@ int main(int argc, char** argv) {
   if (app.got_subcommand("campaign")) return run_campaign(campaign);
   if (app.got_subcommand("day")) return show_day(day);
   return judge_command(folder, judged);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  moldloft::firmware_like::open_console();
+  try {
+    return moldloft::firmware_like::end_of_output(run_command_line(argc, argv), "moldloft-sim");
+  } catch (const std::exception& e) {
+    return moldloft::firmware_like::complain(fmt::format("a defect, please report it: {}", e.what()),
+                                             "moldloft-sim");
+  }
 }

@@ -107,7 +107,8 @@ std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& option
   const firmware_like::RunLabel label{
       .plate = folder->names.plate, .seed = options.cell.seed, .remark = folder->names.remark};
   SimulatedRun run{.summary = summary_of(*controller, label),
-                   .exit_code = firmware_like::exit_code(*controller)};
+                   .exit_code = firmware_like::exit_code(*controller),
+                   .folder = folder->path};
   if (controller->recorder().store_failed())
     return std::unexpected{SimError{std::string{controller->recorder().store_error().view()}}};
   if (!options.resume && !controller->cell().has_driven()) {

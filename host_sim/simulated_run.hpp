@@ -30,11 +30,11 @@ struct SimulatedCell {
 
 struct SimulatedRunOptions {
   CellDescription cell;
-  std::filesystem::path out;
-  std::string config;   // the controller's cell.toml; empty: the one that fits the cell
+  std::filesystem::path out;           // empty: a new folder under out/
+  std::string config;                  // the controller's cell.toml; empty: the one that fits the cell
   std::string name = {}, remark = {};  // of the plate; empty: its shape and seed, nothing
-  bool resume = false;  // goes on with the run in `out`
-  bool held = false;    // comes up held, and waits for what on_tick commands
+  bool resume = false;                 // goes on with the run in `out`
+  bool held = false;                   // comes up held, and waits for what on_tick commands
   bool write_everything =
       true;                // false: run.db and no other file; for campaigns that look at the summary only
   bool real_time = false;  // paced by the wall clock instead of as fast as it goes
@@ -48,6 +48,7 @@ struct SimulatedRunOptions {
 struct SimulatedRun {
   firmware_like::Json summary;  // with `truth` when the run completed
   int exit_code = 0;
+  std::filesystem::path folder = {};  // where it is
 };
 
 std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions&);

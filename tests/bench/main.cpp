@@ -3,7 +3,13 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <iostream>
 #include <span>
+#include <system_error>
 #include <vector>
 
 #include "bench/benchmark.hpp"
@@ -35,8 +41,11 @@ std::span<const Benchmark> all_benchmarks() {
 
 }  // namespace moldloft::bench
 
-int main(int argc, char** argv) {
-  using namespace moldloft::bench;
+namespace {
+
+using namespace moldloft::bench;
+
+int run_command_line(int argc, char** argv) {
   CLI::App app{"Speeds side by side with peers and limits, one run"};
   app.set_version_flag("--version", "moldloft-bench " + moldloft::firmware_like::version_text(),
                        "version, commit and compiler");
@@ -55,4 +64,22 @@ int main(int argc, char** argv) {
   }
   CLI11_PARSE(app, argc, argv);
   return 0;
+}
+
+int cannot_be_written(const char* why) {
+  std::fprintf(stderr, "moldloft-bench: standard output cannot be written: %s\n", why);
+  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::signal(SIGPIPE, SIG_IGN);  // a reader that has gone is an error like a full disk
+  try {
+    const int code = run_command_line(argc, argv);
+    const bool written = std::fflush(stdout) == 0 && std::cout.flush().good();
+    return written ? code : cannot_be_written(std::strerror(errno));
+  } catch (const std::system_error& e) {
+    return cannot_be_written(e.code().message().c_str());
+  }
 }

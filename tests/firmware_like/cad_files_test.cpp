@@ -140,7 +140,10 @@ TEST_CASE(
   CHECK(text_of(iges) == iges_file(small_surface(), facts, "plate.igs").value());
 
   fs::rename(run / "surface.json", folder.file("alone.json"));
-  CHECK(export_run({.run = folder.file("alone.json"), .step = step, .iges = {}}) == exit_done);
+  const std::string before = text_of(step);
+  CHECK(export_run({.run = folder.file("alone.json"), .step = step, .iges = {}}) == exit_failed);
+  CHECK(text_of(step) == before);  // it says something else
+  CHECK(export_run({.run = folder.file("alone.json"), .step = step, .iges = {}, .force = true}) == exit_done);
   CHECK(text_of(step) == step_file(small_surface(), {}, "plate.step").value());
 }
 
@@ -157,7 +160,8 @@ TEST_CASE("export refuses with one line that says what, where and what to do") {
             ": holds no surface.json; only a run that completed has a surface\n");
   const std::string nowhere = folder.file("no/such/folder.step");
   CHECK(refused({.run = run, .step = nowhere, .iges = {}}) ==
-        "moldloft: " + nowhere + ": cannot be written; is the disk full or read-only?\n");
+        "moldloft: " + nowhere + ": cannot be written: there is no folder " + folder.file("no/such") +
+            "; make it first\n");
   std::ofstream(run / "summary.json") << "{";
   CHECK(refused({.run = run, .step = out, .iges = {}}) ==
         "moldloft: " + (run / "summary.json").string() + ": not JSON\n");

@@ -50,7 +50,8 @@ TEST_CASE("a disk that is full leaves the file of before as it was") {
   const auto refused = write_file(path, std::string(100'000, 'x'));
   ::setrlimit(RLIMIT_FSIZE, &limit);
   REQUIRE_FALSE(refused.has_value());
-  CHECK(refused.error().what == path.string() + ": cannot be written; is the disk full or read-only?");
+  CHECK(refused.error().what ==
+        path.string() + ": cannot be written: larger than this user's files may be (ulimit -f)");
   CHECK(text_of(path) == "before");
   CHECK(files_in(folder.path()) == 1);  // nor does half a file stay beside it
 }
@@ -59,8 +60,9 @@ TEST_CASE("a folder that is not there is told by the file's path") {
   const hal::TemporaryFolder folder;
   const auto refused = write_file(folder.file("none/summary.json"), "x");
   REQUIRE_FALSE(refused.has_value());
-  CHECK(refused.error().what ==
-        folder.file("none/summary.json") + ": cannot be written; is the disk full or read-only?");
+  CHECK(refused.error().what == folder.file("none/summary.json") +
+                                    ": cannot be written: there is no folder " + folder.file("none") +
+                                    "; make it first");
 }
 
 TEST_CASE("a surface as JSON: unit, frame, degree, knots, and the net row by row along u") {

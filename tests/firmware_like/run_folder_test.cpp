@@ -1,10 +1,13 @@
 #include "firmware_like/run_folder.hpp"
 
 #include <doctest/doctest.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <regex>
+#include <set>
 
+#include "firmware_like/forked.hpp"
 #include "hal/temporary_folder.hpp"
 
 using namespace moldloft;
@@ -147,6 +150,94 @@ TEST_CASE("a discarded run leaves no trace, and what else lies in the folder sta
   CHECK_FALSE(fs::exists(folder.file("mine/run.db")));
 }
 
-TEST_CASE("the default folder is named by date and time") {
-  CHECK(std::regex_match(default_run_path().string(), std::regex{R"(out/run-\d{8}-\d{6})"}));
+TEST_CASE("runs begun in one second get a folder each, named by date and time") {
+  const hal::TemporaryFolder folder;
+  const fs::path before = fs::current_path();
+  fs::current_path(folder.file(""));
+  std::set<fs::path> made;
+  for (int i = 0; i < 5; ++i) {
+    const auto run = create_run({}, config, RunKind::measured);
+    REQUIRE(run.has_value());
+    CHECK(std::regex_match(run->path.string(), std::regex{R"(out/run-\d{8}-\d{6}(-\d)?)"}));
+    made.insert(run->path);
+  }
+  auto refused_one = create_run({}, config, RunKind::measured);
+  REQUIRE(refused_one.has_value());
+  const fs::path gone = refused_one->path;
+  discard_run(std::move(*refused_one));
+  CHECK_FALSE(fs::exists(gone));
+  fs::current_path(before);
+  CHECK(made.size() == 5);
+}
+
+TEST_CASE("a folder that is written to is refused to everybody else, and free again afterwards") {
+  const hal::TemporaryFolder folder;
+  const std::string path = folder.file("run");
+  {
+    const auto first = create_run(path, config, RunKind::measured);
+    REQUIRE(first.has_value());
+    const std::string link = folder.file("link");
+    fs::create_directory_symlink(path, link);
+    const std::string words = " is in use by process " + std::to_string(::getpid()) +
+                              ": one controller at a time; wait for its end, or stop it";
+    CHECK(refused(create_run(path, config, RunKind::measured)) == path + words);
+    CHECK(refused(resume_run(link, config)) == link + words);
+    CHECK(open_run(path).has_value());  // reading is free
+  }
+  CHECK(resume_run(path, config).has_value());
+}
+
+TEST_CASE("results whose run is elsewhere are not written over by a new run") {
+  const hal::TemporaryFolder folder;
+  std::ofstream{folder.file("summary.json")} << "{}\n";
+  CHECK(refused(create_run(folder.file(""), config, RunKind::measured)) ==
+        folder.file("") + ": holds results whose run is not there; give another --out");
+  CHECK_FALSE(fs::exists(folder.file("run.db")));
+}
+
+TEST_CASE("a run whose folder is removed while it is open is brought back whole") {
+  const hal::TemporaryFolder folder;
+  const std::string path = folder.file("run");
+  const auto run = create_run(path, config, RunKind::measured);
+  REQUIRE(run.has_value());
+  CHECK(*bring_back(*run) == false);
+  REQUIRE(run->store->set_meta("late", "word").has_value());
+  fs::remove_all(path);
+  CHECK(*bring_back(*run) == true);
+  const auto again = hal::RunStore::open(path + "/run.db", hal::RunStore::Mode::read);
+  REQUIRE_MESSAGE(again.has_value(), again.error().what);
+  CHECK(*again->meta("late") == "word");
+  CHECK(*again->meta("config") == config);
+}
+
+TEST_CASE("a crashed run is read whole from a folder that cannot be written, or refused") {
+  const hal::TemporaryFolder folder;
+  const fs::path crashed = folder.file("crashed");
+  test::in_child({}, [&] {
+    auto run = create_run(crashed, config, RunKind::measured);
+    if (run) (void)run->store->set_meta("last", "word");
+    ::_exit(0);  // as a kill leaves it: the last words stand in the log alone
+    return std::string{};
+  });
+  fs::permissions(folder.file(""), fs::perms{0755});
+  const auto last_word = [&](const char* name, std::initializer_list<const char*> parts, fs::perms of_log) {
+    const fs::path copy = folder.file(name);
+    fs::create_directory(copy);
+    for (const char* part : parts) fs::copy_file(crashed / part, copy / part);
+    for (const auto& part : fs::directory_iterator{copy}) fs::permissions(part, fs::perms{0444});
+    fs::permissions(copy / "run.db-wal", of_log);
+    fs::permissions(copy, fs::perms{0555});
+    const std::string word = test::in_child({.nobody = test::is_root(), .memlock_bytes = 65536}, [&] {
+      const auto run = open_run(copy);
+      return run ? run->store->meta("last").value_or("short") : run.error().what;
+    });
+    fs::permissions(copy, fs::perms{0755});
+    return word;
+  };
+  constexpr fs::perms readable{0444}, closed{0};
+  REQUIRE(fs::file_size(crashed / "run.db-wal") > 0);
+  CHECK(last_word("with-index", {"run.db", "run.db-wal", "run.db-shm"}, readable) == "word");
+  CHECK(last_word("without", {"run.db", "run.db-wal"}, readable) == "word");
+  CHECK(last_word("closed", {"run.db", "run.db-wal"}, closed) ==
+        folder.file("closed/run.db-wal") + ": cannot be read, and belongs to the run: check its permissions");
 }
