@@ -6,6 +6,7 @@
 #include "firmware_like/console.hpp"
 #include "firmware_like/run_command.hpp"
 #include "firmware_like/whole_file.hpp"
+#include "hal/printable_text.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -48,7 +49,7 @@ std::expected<void, RunError> exported(const ExportOptions& options) {
     if (!text) return error(fmt::format("{}: cannot be exported as {}", path->string(), text.error().what));
     const Existing existing = options.force ? Existing::replaced : Existing::kept;
     if (auto written = write_file(file, *text, existing); !written) return written;
-    const std::string line = fmt::format("{}: {} x {} control points, mm\n", file.string(),
+    const std::string line = fmt::format("{}: {} x {} control points, mm\n", hal::printable(file.string()),
                                          surface->control_u(), surface->control_v());
     is_standard_output(file) ? say(line) : show(line);
     return {};
@@ -62,8 +63,7 @@ std::expected<void, RunError> exported(const ExportOptions& options) {
 int export_run(const ExportOptions& options) {
   const auto done = exported(options);
   if (done) return exit_done;
-  say(fmt::format("moldloft: {}\n", done.error().what));
-  return exit_failed;
+  return complain(done.error().what);
 }
 
 }  // namespace moldloft::firmware_like

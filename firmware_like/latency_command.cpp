@@ -278,14 +278,14 @@ int measure_latency(const LatencyOptions& options) {
     timing["compared"] = comparison_json(load->scheduler().wake_up(), *measured->cyclictest);
   if (!options.out.empty()) {
     for (const auto& [name, content] :
-         {std::pair{"timing.json", timing.dump(2) + "\n"},
+         {std::pair{"timing.json", json_text(timing, 2) + "\n"},
           std::pair{"report.html", timing_page(timing, page_title(place->path()))}}) {
       const auto written = write_file(place->path() / name, content);
       if (!written) return refuse(written.error().what);
     }
   }
   if (options.json)
-    show(fmt::format("{}\n", latency_json(timing).dump(2)));
+    show(fmt::format("{}\n", json_text(latency_json(timing), 2)));
   else
     show(fmt::format("{}\n{}{}", conditions_text(measured->conditions), busy_line(timing["busy"]),
                      timing_table(timing)));

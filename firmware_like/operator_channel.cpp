@@ -16,6 +16,7 @@
 
 #include "firmware_like/console.hpp"
 #include "firmware_like/run_command.hpp"
+#include "hal/printable_text.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -80,16 +81,15 @@ std::string without_line_end(std::string_view text) {
 std::string status_json(const tasks::CellProgress& p) {
   constexpr std::array<const char*, 6> causes = {"none",   "scanner", "recorder",
                                                  "person", "plan",    "measurement"};
-  return Json{{"state", std::string{tasks::to_string(p.state)}},
-              {"phase", std::string{tasks::to_string(p.phase)}},
-              {"hold_cause", causes[static_cast<std::size_t>(p.cause)]},
-              {"why", std::string{p.why.view()}},
-              {"boundary_shots", p.boundary_shots},
-              {"surface_shots", p.surface_shots},
-              {"surface_planned", p.surface_planned},
-              {"retaken", p.retaken},
-              {"seconds", std::chrono::duration<double>(p.now).count()}}
-      .dump();
+  return json_text(Json{{"state", std::string{tasks::to_string(p.state)}},
+                        {"phase", std::string{tasks::to_string(p.phase)}},
+                        {"hold_cause", causes[static_cast<std::size_t>(p.cause)]},
+                        {"why", std::string{p.why.view()}},
+                        {"boundary_shots", p.boundary_shots},
+                        {"surface_shots", p.surface_shots},
+                        {"surface_planned", p.surface_planned},
+                        {"retaken", p.retaken},
+                        {"seconds", std::chrono::duration<double>(p.now).count()}});
 }
 
 std::string answer_to(std::string_view word, tasks::Cell& cell, const std::function<void()>& let_time_pass) {
@@ -196,14 +196,13 @@ std::expected<std::string, std::string> ask_cell(const std::string& word, const 
     return std::unexpected{
         fmt::format("{}: {}; is moldloft running with --control?", path, std::strerror(why))};
   if (size < 0) return std::unexpected{fmt::format("{}: no answer within {} s", path, answer_limit / 1s)};
-  return without_line_end({answer.data(), static_cast<std::size_t>(size)});
+  return hal::printable(without_line_end({answer.data(), static_cast<std::size_t>(size)}));
 }
 
 int tell_cell(const TellOptions& options) {
   const auto answer = ask_cell(options.word, options.control);
   if (!answer || answer->starts_with("refused:")) {
-    say(fmt::format("moldloft: {}\n", answer ? *answer : answer.error()));
-    return exit_failed;
+    return complain(answer ? *answer : answer.error());
   }
   show(fmt::format("{}\n", *answer));
   return exit_done;

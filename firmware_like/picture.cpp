@@ -8,6 +8,8 @@
 #include <cmath>
 #include <map>
 
+#include "hal/printable_text.hpp"
+
 namespace moldloft::firmware_like {
 namespace {
 
@@ -147,7 +149,7 @@ double nice_limit(const PlateField& field) {
 // What stands in a title may come from a file's name.
 std::string escaped(std::string_view text) {
   std::string out;
-  for (const char c : text) {
+  for (const char c : hal::printable(text)) {
     if (c == '&')
       out += "&amp;";
     else if (c == '<')

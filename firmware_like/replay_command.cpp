@@ -11,6 +11,7 @@
 #include "firmware_like/flight_timeline.hpp"
 #include "firmware_like/run_command.hpp"
 #include "firmware_like/run_folder.hpp"
+#include "hal/printable_text.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -26,13 +27,13 @@ int show_timelines(const ReplayOptions& options) {
   if (dumps.empty()) {
     show(fmt::format(
         "{}: the flight recorder was never frozen: no overrun, no missed tick, no abort, no crash\n",
-        options.run));
+        hal::printable(options.run)));
     return exit_done;
   }
   for (const fs::path& path : dumps) {
     const auto dump = hal::read_flight_dump(path);
     if (!dump) return complain(dump.error().what);
-    show(fmt::format("{}\n{}\n", path.string(),
+    show(fmt::format("{}\n{}\n", hal::printable(path.string()),
                      flight_timeline(*dump, {.ticks_before = options.ticks, .all = options.all_ticks})));
   }
   return exit_done;

@@ -7,6 +7,7 @@
 #include "firmware_like/run_command.hpp"
 #include "firmware_like/timing_page.hpp"
 #include "firmware_like/timing_table.hpp"
+#include "hal/printable_text.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -35,7 +36,8 @@ int report_run(const ReportOptions& options) {
   }
   if (const auto written = write_file(folder / "report.html", page); !written)
     return refuse(written.error().what);
-  show(fmt::format("{}\nreport                      {}\n", text, (folder / "report.html").string()));
+  show(fmt::format("{}\nreport                      {}\n", text,
+                   hal::printable((folder / "report.html").string())));
   return exit_done;
 }
 

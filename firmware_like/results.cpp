@@ -10,6 +10,7 @@
 #include "firmware_like/ply_writer.hpp"
 #include "firmware_like/timing_page.hpp"
 #include "firmware_like/timing_report.hpp"
+#include "hal/printable_text.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -66,9 +67,9 @@ Json summary_of(const Controller& c, const RunLabel& label) {
   j["unit"] = "mm";
   j["result"] = result_word(c);
   j["message"] = std::string{cell.why().view()};
-  j["plate"] = label.plate;
-  j["cell"] = c.config().name;
-  if (!label.remark.empty()) j["remark"] = label.remark;
+  j["plate"] = hal::printable(label.plate);
+  j["cell"] = hal::printable(c.config().name);
+  if (!label.remark.empty()) j["remark"] = hal::printable(label.remark);
   j["seed"] = label.seed ? Json(*label.seed) : Json(nullptr);
   if (!label.begun.empty()) j["begun"] = label.begun;
   j["program"] = {
@@ -127,7 +128,7 @@ std::string events_jsonl(const std::vector<hal::EventRecord>& events) {
     put("from", e.from);
     put("to", e.to);
     put("text", e.text);
-    lines += j.dump() + "\n";
+    lines += json_text(j) + "\n";
   }
   return lines;
 }
@@ -174,7 +175,7 @@ std::expected<void, RunError> write_results(const Controller& c, const RunFolder
         gate_sigmas * std::max(c.surface().fit().report().sigma_mm, c.config().scanner.noise_mm);
     const auto points = measured_points(c, *folder.store, points_in_ply, gate);
     if (!points) return std::unexpected{RunError{points.error().what}};
-    write("surface.json", surface_json(surface).dump() + "\n");
+    write("surface.json", json_text(surface_json(surface)) + "\n");
     const CadFacts facts = cad_facts(summary);
     const auto step = step_file(surface, facts, "surface.step"),
                iges = iges_file(surface, facts, "surface.igs");
@@ -192,9 +193,9 @@ std::expected<void, RunError> write_results(const Controller& c, const RunFolder
   write("events.jsonl", events_jsonl(*events));
   write("overview.svg", picture(c, label, summary, std::move(fields)));
   const Json timing = timing_of(c, label.conditions);
-  write("timing.json", timing.dump(2) + "\n");
+  write("timing.json", json_text(timing, 2) + "\n");
   write("report.html", timing_page(timing, "Timing of " + label.plate, about_run(summary)));
-  write("summary.json", summary.dump(2) + "\n");
+  write("summary.json", json_text(summary, 2) + "\n");
   return result;
 }
 

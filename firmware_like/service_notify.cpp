@@ -5,6 +5,8 @@
 
 #include <cstdint>
 
+#include "hal/printable_text.hpp"
+
 namespace moldloft::firmware_like {
 
 ServiceNotify::ServiceNotify() {
@@ -13,16 +15,17 @@ ServiceNotify::ServiceNotify() {
   if (sd_watchdog_enabled(0, &limit_us) > 0) watchdog_ = std::chrono::microseconds{limit_us};
 }
 
+// A line end in a status would begin an assignment of its own.
 void ServiceNotify::ready(std::string_view status) {
-  sd_notify(0, fmt::format("READY=1\nSTATUS={}", status).c_str());
+  sd_notify(0, fmt::format("READY=1\nSTATUS={}", hal::printable(status)).c_str());
 }
 
 void ServiceNotify::status(std::string_view status) {
-  sd_notify(0, fmt::format("STATUS={}", status).c_str());
+  sd_notify(0, fmt::format("STATUS={}", hal::printable(status)).c_str());
 }
 
 void ServiceNotify::stopping(std::string_view status) {
-  sd_notify(0, fmt::format("STOPPING=1\nSTATUS={}", status).c_str());
+  sd_notify(0, fmt::format("STOPPING=1\nSTATUS={}", hal::printable(status)).c_str());
 }
 
 void ServiceNotify::feed() { sd_notify(0, "WATCHDOG=1"); }

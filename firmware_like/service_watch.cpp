@@ -78,7 +78,7 @@ void ServiceWatch::tell_culprit(const LoopSight& sight) {
                        {"ticks", ticks_},
                        {"stood_s", seconds(standing_)},
                        {"time", now_utc()}};
-  if (const auto written = write_file(report_, report.dump(2) + "\n"); !written)
+  if (const auto written = write_file(report_, json_text(report, 2) + "\n"); !written)
     say(fmt::format("moldloft: {}\n", written.error().what));
 }
 

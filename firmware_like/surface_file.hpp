@@ -10,14 +10,12 @@
 
 #include <expected>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
+#include "firmware_like/json_text.hpp"
 #include "firmware_like/run_folder.hpp"
 #include "geometry/splines/bspline.hpp"
 
 namespace moldloft::firmware_like {
-
-using Json = nlohmann::ordered_json;
 
 Json surface_json(const geometry::BSplineSurface&);
 std::expected<geometry::BSplineSurface, RunError> read_surface(const std::filesystem::path&);

@@ -6,6 +6,7 @@
 
 #include "firmware_like/log_plot.hpp"
 #include "firmware_like/timing_report.hpp"
+#include "hal/printable_text.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -41,7 +42,7 @@ svg{width:100%;height:auto;display:block}.grid{stroke:var(--line)}.fine{stroke:v
 
 std::string escaped(std::string_view text) {
   std::string out;
-  for (const char c : text) {
+  for (const char c : hal::printable(text)) {
     switch (c) {
       case '&':
         out += "&amp;";

@@ -6,7 +6,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hal/printable_text.hpp"
+
 namespace moldloft::firmware_like {
+namespace {
+
+// A device's path, a host, a name: longer than any path may be (PATH_MAX), and a message of ours still fits a screen.
+constexpr std::size_t longest_text = 4095;
+
+constexpr std::size_t longest_label = 200;  // of a name: a title still fits a page
+
+// Of a key or value that stands in a message: what is wrong with it comes behind, and must be seen.
+std::string shown(std::string_view text) { return hal::printable(text, 60); }
+
+}  // namespace
 
 TomlSection::TomlSection(const toml::table* table, std::string name, std::vector<ConfigFinding>& findings)
     : table_{table}, name_{std::move(name)}, findings_{findings} {}
@@ -20,7 +33,7 @@ void TomlSection::wrong(const toml::node& at, std::string_view key, std::string_
   const std::string section = name_.empty() ? "" : fmt::format("[{}] ", name_);
   findings_.push_back({Severity::error,
                        static_cast<int>(at.source().begin.line),
-                       fmt::format("{}{}: {}", section, key, what),
+                       hal::printable(fmt::format("{}{}: {}", section, shown(key), what)),
                        {name_.empty() ? std::string{key} : fmt::format("{}.{}", name_, key)}});
 }
 
@@ -54,7 +67,18 @@ void TomlSection::text(std::string_view key, std::string& value) {
   const toml::node* n = node(key);
   if (n == nullptr) return;
   if (!n->is_string()) return wrong(*n, key, "a text in quotes is wanted");
-  value = *n->value<std::string>();
+  const auto given = *n->value<std::string>();
+  if (given.size() > longest_text)
+    return wrong(*n, key, fmt::format("{} bytes long; {} at most", given.size(), longest_text));
+  if (hal::printable(given) != given) return wrong(*n, key, "holds a control character: write it without");
+  value = given;
+}
+
+void TomlSection::label(std::string_view key, std::string& value) {
+  const toml::node* n = node(key);
+  if (n == nullptr) return;
+  if (!n->is_string()) return wrong(*n, key, "a text in quotes is wanted");
+  value = hal::printable(*n->value<std::string>(), longest_label);
 }
 
 void TomlSection::choice(std::string_view key, std::string& value, const std::vector<std::string>& allowed) {
@@ -63,7 +87,7 @@ void TomlSection::choice(std::string_view key, std::string& value, const std::ve
   if (!n->is_string()) return text(key, value);
   text(key, value);
   if (std::find(allowed.begin(), allowed.end(), value) == allowed.end()) {
-    wrong(*n, key, fmt::format("'{}' is not one of: {}", value, fmt::join(allowed, ", ")));
+    wrong(*n, key, fmt::format("'{}' is not one of: {}", shown(value), fmt::join(allowed, ", ")));
   }
 }
 

@@ -27,6 +27,7 @@ class TomlSection {
   void integer(std::string_view key, int& value, int min, int max);
   void flag(std::string_view key, bool& value);
   void text(std::string_view key, std::string& value);
+  void label(std::string_view key, std::string& value);  // for people: what cannot be shown is replaced
   void choice(std::string_view key, std::string& value, const std::vector<std::string>& allowed);
   void numbers(std::string_view key, std::span<double> values, double min,
                double max);  // an array of that length

@@ -3,7 +3,7 @@
 // Thread       a value, like an int
 // Blocking     never
 // Allocation   none
-// Failure      a text that does not fit is cut at the capacity
+// Failure      a text that does not fit is cut at the capacity, never within a character of UTF-8
 #pragma once
 
 #include "hal/realtime.hpp"
@@ -31,6 +31,18 @@ struct BasicTextPattern {
 template <typename... Args>
 using TextPattern = BasicTextPattern<std::type_identity_t<Args>...>;
 
+// How many of the first `size` bytes are whole characters of UTF-8, when the text goes on behind them: a character that
+// the cut goes through goes whole. Bytes that are no UTF-8 stay as they are.
+inline std::size_t whole_characters(const char* text, std::size_t size) noexcept MOLDLOFT_NONBLOCKING {
+  for (std::size_t back = 1; back <= 3 && back <= size; ++back) {
+    const auto byte = static_cast<unsigned char>(text[size - back]);
+    if ((byte & 0xC0) == 0x80) continue;  // not a character's first byte
+    const std::size_t length = byte >= 0xF0 ? 4 : byte >= 0xE0 ? 3 : byte >= 0xC0 ? 2 : 1;
+    return length > back ? size - back : size;
+  }
+  return size;
+}
+
 template <std::size_t capacity>
 class FixedText {
  public:
@@ -46,12 +58,12 @@ class FixedText {
       return fmt::format_to_n(text.chars_.data(), capacity, text_pattern.pattern,
                               std::forward<Args>(args)...);
     });
-    text.size_ = result.size < capacity ? result.size : capacity;
+    text.size_ = result.size <= capacity ? result.size : whole_characters(text.chars_.data(), capacity);
     return text;
   }
 
   void assign(std::string_view text) noexcept {
-    size_ = text.size() < capacity ? text.size() : capacity;
+    size_ = text.size() <= capacity ? text.size() : whole_characters(text.data(), capacity);
     if (size_ > 0) std::memcpy(chars_.data(), text.data(), size_);
   }
   std::string_view view() const noexcept { return {chars_.data(), size_}; }

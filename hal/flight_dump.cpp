@@ -4,6 +4,8 @@
 
 #include <fstream>
 
+#include "hal/printable_text.hpp"
+
 namespace moldloft::hal {
 namespace {
 
@@ -14,6 +16,14 @@ template <typename T>
 bool read_into(std::ifstream& file, T* first, std::size_t count) {
   const auto bytes = static_cast<std::streamsize>(count * sizeof(T));
   return static_cast<bool>(file.read(reinterpret_cast<char*>(first), bytes));
+}
+
+// A file may hold anything, and these texts go to a terminal.
+template <std::size_t size>
+void make_printable_in_place(std::array<char, size>& text) {
+  const auto fit = printable_text<size>(flight_text(text));
+  text = {};
+  fit.view().copy(text.data(), size);
 }
 
 }  // namespace
@@ -60,6 +70,11 @@ std::expected<FlightDump, FlightDumpError> read_flight_dump(const std::string& p
   if (!read_into(file, dump.events.data(), dump.events.size()) ||
       !read_into(file, dump.transitions.data(), dump.transitions.size()))
     return flaw("ends early; was the disk full?");
+  for (auto& name : dump.header.names) make_printable_in_place(name);
+  for (auto& t : dump.transitions) {
+    make_printable_in_place(t.source);
+    for (auto* text : {&t.event, &t.from, &t.to}) make_printable_in_place(*text);
+  }
   return dump;
 }
 

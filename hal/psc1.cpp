@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "hal/little_endian.hpp"
+#include "hal/printable_text.hpp"
 
 namespace moldloft::hal::psc1 {
 namespace {
@@ -74,6 +75,12 @@ std::string_view to_string(Flaw flaw) {
       return "a field holds an impossible value";
   }
   return "unknown flaw";
+}
+
+std::string_view to_string(Status status) {
+  constexpr std::array<std::string_view, 7> names = {"OK",   "BAD_STATE",    "BAD_ARGUMENT", "UNSUPPORTED",
+                                                     "BUSY", "SENSOR_FAULT", "TIMEOUT"};
+  return names[std::min<std::size_t>(static_cast<std::size_t>(status), names.size() - 1)];
 }
 
 // ---- headers
@@ -271,7 +278,7 @@ std::expected<ErrorReply, Flaw> decode_error(std::span<const std::byte> payload)
   const std::size_t length = from.get<std::uint16_t>();
   error.shot_id = from.get<std::uint32_t>();
   const auto text = from.take(length);
-  error.text = std::string_view{reinterpret_cast<const char*>(text.data()), text.size()};
+  error.text = printable_text<100>({reinterpret_cast<const char*>(text.data()), text.size()});
   return checked(error, payload.size(), 8 + length, known(error.status) && length <= 100);
 }
 

@@ -64,6 +64,7 @@ enum class Flaw {
   content
 };
 std::string_view to_string(Flaw) MOLDLOFT_NONBLOCKING;
+std::string_view to_string(Status) MOLDLOFT_NONBLOCKING;  // its name in PROTOCOLS.md
 
 struct Header {
   Type type{};
@@ -106,7 +107,7 @@ struct StatusReply {
 struct ErrorReply {
   Status status = Status::ok;
   std::uint32_t shot_id = 0;  // 0 when the error belongs to no shot
-  FixedText<100> text{};
+  FixedText<100> text{};      // decoded: printable, whatever the bytes were
 };
 
 // How a FRAME's payload begins; the stripe table and the columns follow (PROTOCOLS.md, "FRAME").

@@ -6,6 +6,7 @@
 
 #include "hal/flight_recorder.hpp"
 #include "hal/latest_value.hpp"
+#include "hal/printable_text.hpp"
 #include "hal/record_ring.hpp"
 #include "hal/run_store.hpp"
 
@@ -144,7 +145,7 @@ bool Recorder::drain(RunStore& to) {
   if (done) done = to.commit();
   if (!done) {
     to.roll_back();
-    rings_->error.set(Message{done.error().what});
+    rings_->error.set(printable_text<160>(done.error().what));
     rings_->failed.store(true, std::memory_order_release);
     return false;
   }

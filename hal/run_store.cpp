@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "hal/printable_text.hpp"
 #include "hal/psc1.hpp"
 #include "hal/statement.hpp"
 
@@ -75,7 +76,7 @@ StoreError error_of(int code, const std::string& path, std::string_view detail) 
 
 // A name may hold what a URI gives a meaning to.
 std::string uri_of(const std::string& path) {
-  std::string uri = "file:";
+  std::string uri = path.starts_with("//") ? "file://" : "file:";  // two slashes would begin a host's name
   for (const char c : path) {
     if (c == '%' || c == '?' || c == '#') {
       uri += fmt::format("%{:02X}", static_cast<unsigned char>(c));
@@ -349,6 +350,7 @@ std::expected<std::vector<ShotRecord>, StoreError> RunStore::shots() const {
   return shots;
 }
 
+// Stores of earlier versions hold what a device had said byte by byte.
 std::expected<std::vector<EventRecord>, StoreError> RunStore::events() const {
   Statement query{database_->handle,
                   "SELECT t_ns, source, event, from_state, to_state, text FROM events ORDER BY seq"};
@@ -356,11 +358,11 @@ std::expected<std::vector<EventRecord>, StoreError> RunStore::events() const {
   int code = query.step();
   for (; code == SQLITE_ROW; code = query.step()) {
     events.push_back({.at = Instant{query.integer(0)},
-                      .source = query.text(1),
-                      .event = query.text(2),
-                      .from = query.text(3),
-                      .to = query.text(4),
-                      .text = query.text(5)});
+                      .source = printable_text<16>(query.text(1)),
+                      .event = printable_text<24>(query.text(2)),
+                      .from = printable_text<24>(query.text(3)),
+                      .to = printable_text<24>(query.text(4)),
+                      .text = printable_text<160>(query.text(5))});
   }
   if (code != SQLITE_DONE) return std::unexpected{database_->error(code)};
   return events;

@@ -182,7 +182,7 @@ int run_campaign(const CampaignOptions& options) {
                      {"result", r.result},
                      {"truth", r.truth}});
     }
-    show(fmt::format("{}\n", all.dump(1)));
+    show(fmt::format("{}\n", firmware_like::json_text(all, 1)));
   } else {
     print_summary(rows);
   }

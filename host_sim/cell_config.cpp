@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "hal/printable_text.hpp"
 #include "tasks/tool_pose.hpp"
 
 namespace moldloft::host_sim {
@@ -33,6 +34,16 @@ std::string workspace(const CellDescription& d) {
       -reach, reach, d.scara.tip_low_mm, d.scara.tip_low_mm + d.scara.stroke_mm, std::ceil(inner));
 }
 
+// A basic string of TOML: a plate may be called after a file, and a file's name may hold anything.
+std::string toml_string(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : hal::printable(text)) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + '"';
+}
+
 }  // namespace
 
 bool is_generated_cell(const std::string& path) {
@@ -54,8 +65,8 @@ std::string cell_toml(const CellDescription& d, const PlateInstance& plate, cons
       addresses.scanner_port, d.optics.stripes, d.optics.points_per_stripe, d.optics.field_x_mm,
       d.optics.field_y_mm, d.optics.noise_mm, d.optics.depth_mm);
   t += "\n[scanner.mount]\ntranslation_mm = [0, 140, 300]\nzyz_deg = [0, 180, 180]\n";
-  t += fmt::format("\n[robot]\ndevice = \"{}\"\nrepeatability_z_mm = {}\n\n[robot.workspace]\n{}",
-                   addresses.robot_device, d.drive.errors.z_mm, workspace(d));
+  t += fmt::format("\n[robot]\ndevice = {}\nrepeatability_z_mm = {}\n\n[robot.workspace]\n{}",
+                   toml_string(addresses.robot_device), d.drive.errors.z_mm, workspace(d));
   t += fmt::format("\n[plate]\nthickness_mm = {}\ntable_z_mm = {}\nlargest_mm = [{}, {}]\n",
                    plate.plate->thickness_mm(), plate.table_z_mm, roomy(size.x()), roomy(size.y()));
   t += fmt::format("\n[start]\ncentre_mm = [{:.3f}, {:.3f}, {:.3f}]\nyaw_deg = {:.3f}\n", centre.x(),

@@ -220,7 +220,7 @@ int show_day(const DayOptions& asked) {
     return 1;
   }
   if (options.json) {
-    show(fmt::format("{}\n", json_of(*day).dump(2)));
+    show(fmt::format("{}\n", firmware_like::json_text(json_of(*day), 2)));
   } else {
     show(fmt::format("{}\n",
                      day->flat

@@ -29,7 +29,7 @@ volatile std::sig_atomic_t asked_to_end = 0;
 void ask_to_end(int) { asked_to_end = 1; }
 
 int failed(const SimError& error) {
-  say(fmt::format("moldloft-sim devices: {}\n", error.what));
+  say(fmt::format("moldloft-sim devices: {}\n", hal::printable(error.what)));
   return 1;
 }
 
@@ -90,7 +90,7 @@ int run_devices(const DeviceOptions& options) {
   const auto plate = placed_plate(options.cell);
   if (!plate) return failed(plate.error());
   if (const auto& remarks = plate->plate->remarks(); !remarks.empty())
-    fmt::print(stderr, "plate {}: {}\n", plate->plate->name(), remarks);
+    say(fmt::format("plate {}: {}\n", plate->plate->name(), remarks));
   auto scanner = TcpServerLink::listen_on(options.scanner_port);
   if (!scanner) return failed(scanner.error());
   const std::uint16_t scanner_port = (*scanner)->port();

@@ -173,7 +173,7 @@ std::expected<Verdict, SimError> judge_run(const std::string& folder, const Plat
                          {"normal_rms_mm", verdict->normal_rms_mm},
                          {"outline_max_mm", verdict->outline_max_mm},
                          {"corner_max_mm", verdict->corner_max_mm}};
-  if (const auto written = firmware_like::write_file(path, summary->dump(2) + "\n"); !written)
+  if (const auto written = firmware_like::write_file(path, firmware_like::json_text(*summary, 2) + "\n"); !written)
     return std::unexpected(SimError{written.error().what});
   return verdict;
 }

@@ -11,6 +11,7 @@
 #include "firmware_like/display.hpp"
 #include "firmware_like/plate_name.hpp"
 #include "firmware_like/run_command.hpp"
+#include "hal/printable_text.hpp"
 #include "host_sim/campaign.hpp"
 #include "host_sim/cell_options.hpp"
 #include "host_sim/day.hpp"
@@ -35,10 +36,11 @@ int judge_command(const std::string& folder, const CellDescription& cell) {
   if (plate) say_remarks(*plate);
   const auto verdict = plate ? judge_run(folder, *plate) : std::unexpected(plate.error());
   if (!verdict) {
-    say(fmt::format("moldloft-sim judge: {}\n", verdict.error().what));
+    say(fmt::format("moldloft-sim judge: {}\n", moldloft::hal::printable(verdict.error().what)));
     return 1;
   }
-  show(fmt::format("plate {} seed {}, {} points\n", cell.plate, cell.seed, verdict->points));
+  show(fmt::format("plate {} seed {}, {} points\n", moldloft::hal::printable(cell.plate), cell.seed,
+                   verdict->points));
   show(fmt::format("{:<24}{:>10.4f} mm\n", "truth.normal_max", verdict->normal_max_mm));
   show(fmt::format("{:<24}{:>10.4f} mm\n", "truth.normal_rms", verdict->normal_rms_mm));
   show(fmt::format("{:<24}{:>10.4f} mm\n", "truth.outline_max", verdict->outline_max_mm));
@@ -57,7 +59,7 @@ int cell_command(SimulatedRunOptions& options) {
   const auto run = simulate(options);
   if (terminal && run) say(fmt::format("\n"));
   if (!run) {
-    say(fmt::format("moldloft-sim cell: {}\n", run.error().what));
+    say(fmt::format("moldloft-sim cell: {}\n", moldloft::hal::printable(run.error().what)));
     return 1;
   }
   if (run->exit_code != 0) {

@@ -46,6 +46,10 @@ const std::vector<Ban> bans = {
      {},
      "threads are started in firmware_like and host_sim"},
     {R"(\bstd::function\b)", {"hal/", "tasks/"}, {}, "a template or a pointer: std::function may allocate"},
+    {R"(\.dump\(\d*\)|->dump\(\d*\))",
+     {"firmware_like/", "host_sim/"},
+     {"firmware_like/json_text."},
+     "json_text(): dump() throws where a string is no UTF-8"},
     {R"(\bstd::(cout|cerr|clog|cin)\b)", rooms, {}, "fmt::print in the programs, a value elsewhere"},
 };
 

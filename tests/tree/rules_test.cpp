@@ -105,6 +105,13 @@ TEST_CASE("reading time outside hal/clock.cpp is found, while a test may measure
   CHECK_FALSE(breaks(banned_findings("tests/geometry/a.cpp", "auto t = std::chrono::steady_clock::now();")));
 }
 
+TEST_CASE("JSON that is written past json_text() is found, a flight recorder's dump is not JSON") {
+  CHECK(breaks(banned_findings("firmware_like/a.cpp", "write(summary.dump(2));")));
+  CHECK(breaks(banned_findings("host_sim/a.cpp", "file << summary->dump();")));
+  CHECK_FALSE(breaks(banned_findings("firmware_like/a.cpp", "flight_.dump(file);")));
+  CHECK_FALSE(breaks(banned_findings("tests/firmware_like/a.cpp", "CAPTURE(seen.dump(1));")));
+}
+
 TEST_CASE("threads outside firmware_like and host_sim are found") {
   for (const char* room : {"geometry", "hal", "tasks"}) {
     CHECK(breaks(banned_findings(std::string{room} + "/a.hpp", "std::thread thread_;")));
