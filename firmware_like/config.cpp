@@ -16,6 +16,7 @@
 #include "firmware_like/plate_name.hpp"
 #include "firmware_like/task_table.hpp"
 #include "firmware_like/toml_section.hpp"
+#include "hal/printable_text.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -67,6 +68,10 @@ void read_robot(TomlSection s, RobotConfig& c) {
   s.integer("baud", c.baud, 1200, 921600);
   s.integer("speed_percent", c.speed_percent, 1, 100);
   s.number("repeatability_z_mm", c.repeatability_z_mm, 0, 10);
+  s.number("arrival_mm", c.arrival.distance_mm, 0.01, 1000);
+  double arrival_deg = c.arrival.turn_rad / degree;
+  s.number("arrival_deg", arrival_deg, 0.01, 180);
+  c.arrival.turn_rad = arrival_deg * degree;
   TomlSection w = s.section("workspace");
   read_range(w, "x_mm", c.workspace.x_mm);
   read_range(w, "y_mm", c.workspace.y_mm);
@@ -89,7 +94,7 @@ void read_realtime(TomlSection s, RealtimeConfig& c) {
 
 void read_rest(TomlSection& file, CellConfig& c) {
   TomlSection cell = file.section("cell");
-  cell.text("name", c.name);
+  cell.label("name", c.name);
   int tick_us = static_cast<int>(c.tick.count() / 1000);
   cell.integer("tick_us", tick_us, static_cast<int>(shortest_tick.count() / 1000), 100000);
   c.tick = std::chrono::microseconds{tick_us};
@@ -102,6 +107,9 @@ void read_rest(TomlSection& file, CellConfig& c) {
   double timeout_s = std::chrono::duration<double>(c.device_timeout).count();
   cell.number("device_timeout_s", timeout_s, 0.1, 3600);
   c.device_timeout = std::chrono::duration_cast<hal::Duration>(std::chrono::duration<double>(timeout_s));
+  double wait_s = std::chrono::duration<double>(c.scanner_wait).count();
+  cell.number("scanner_wait_s", wait_s, 1, 86400);
+  c.scanner_wait = std::chrono::duration_cast<hal::Duration>(std::chrono::duration<double>(wait_s));
   cell.finish();
 
   TomlSection plate = file.section("plate");
@@ -263,7 +271,8 @@ std::string first_difference(const std::string& text, const std::string& other) 
   flatten(toml::parse(text), "", a);
   flatten(toml::parse(other), "", b);
   for (auto* keys : {&a, &b}) {
-    for (const char* no_matter : {"cell.name", "cell.device_timeout_s", "scanner.host", "scanner.port",
+    for (const char* no_matter : {"cell.name", "cell.device_timeout_s", "cell.scanner_wait_s",
+                                  "robot.arrival_mm", "robot.arrival_deg", "scanner.host", "scanner.port",
                                   "robot.device", "robot.baud", "plate.largest_mm"}) {
       keys->erase(no_matter);
     }
@@ -321,7 +330,7 @@ std::expected<CellConfig, ConfigError> parse_config(const std::string& text, con
   std::string errors;
   for (const auto& finding : examined.findings) {
     if (finding.severity == Severity::error)
-      errors += (errors.empty() ? "" : "\n") + finding_text(path, finding);
+      errors += (errors.empty() ? "" : "\n") + hal::printable(finding_text(path, finding));
   }
   if (!errors.empty()) return std::unexpected{ConfigError{std::move(errors)}};
   return std::move(examined.config);

@@ -40,6 +40,7 @@ struct RobotConfig {
   int speed_percent = 100;
   double repeatability_z_mm = 0.013;
   tasks::Workspace workspace;
+  tasks::Arrival arrival;
 };
 
 struct PlateConfig {
@@ -55,6 +56,7 @@ struct CellConfig {
   hal::Duration tick = std::chrono::milliseconds{1};
   tasks::MissedTickPolicy missed_ticks = tasks::MissedTickPolicy::skip_keep_phase;
   hal::Duration device_timeout = std::chrono::seconds{10};
+  hal::Duration scanner_wait = std::chrono::seconds{300};  // long enough for a scanner to boot, twice
   ScannerConfig scanner;
   RobotConfig robot;
   PlateConfig plate;

@@ -18,6 +18,8 @@ tasks::CellSettings settings_for(const CellConfig& config, const ControllerOptio
   tasks::CellSettings s = cell_settings(config);
   s.epoch = options.epoch;
   s.devices = options.devices;
+  // Whoever can command the cell decides how long a lost scanner is waited for.
+  s.scanner_wait = options.attended ? hal::Duration::max() : config.scanner_wait;
   return s;
 }
 
@@ -33,7 +35,7 @@ Controller::Controller(const CellConfig& config, hal::Clock& clock, hal::ByteLin
       scanner_link_{scanner_link, hal::LinkId::scanner, recorder_, clock},
       robot_link_{robot_link, hal::LinkId::robot, recorder_, clock},
       scanner_{make_scanner(config.scanner, scanner_link_)},
-      robot_{make_robot(config.robot, robot_link_)},
+      robot_{make_robot(config.robot, robot_link_, options.nonce)},
       surface_{surface_settings(config)},
       cell_{settings_for(config, options), clock, *scanner_, *robot_, recorder_, surface_, options.archive},
       receive_scanner_{Row{this, &Controller::receive_scanner}},

@@ -28,8 +28,9 @@ namespace moldloft::firmware_like {
 struct ControllerOptions {
   const tasks::ShotArchive* archive = nullptr;  // shots of a run that is resumed or fitted again
   std::uint32_t epoch = 1;                      // of this run's shot ids
-  bool devices = true;                          // false: archived shots only
-  bool begin_held = false;                      // nothing moves before an operator sends unhold
+  std::uint32_t nonce = 1;  // before the first SYN's: another at each start of the program
+  bool devices = true;      // false: archived shots only
+  bool begin_held = false;  // nothing moves before an operator sends unhold
   // Somebody can command the cell: what waits for a person is waited for, instead of ending the run.
   bool attended = false;
 };

@@ -19,9 +19,10 @@ std::unique_ptr<hal::Scanner> make_scanner(const ScannerConfig& config, hal::Byt
   return nullptr;
 }
 
-std::unique_ptr<hal::Robot> make_robot(const RobotConfig& config, hal::ByteLink& link) {
+std::unique_ptr<hal::Robot> make_robot(const RobotConfig& config, hal::ByteLink& link, std::uint32_t nonce) {
   if (config.driver == "line") {
-    return std::make_unique<hal::LineRobot>(link, hal::LineRobot::Settings{.baud = config.baud});
+    return std::make_unique<hal::LineRobot>(
+        link, hal::LineRobot::Settings{.baud = config.baud, .first_nonce = nonce});
   }
   assert(!"the configuration admits only known drivers");
   return nullptr;

@@ -12,6 +12,6 @@
 namespace moldloft::firmware_like {
 
 std::unique_ptr<hal::Scanner> make_scanner(const ScannerConfig&, hal::ByteLink&);
-std::unique_ptr<hal::Robot> make_robot(const RobotConfig&, hal::ByteLink&);
+std::unique_ptr<hal::Robot> make_robot(const RobotConfig&, hal::ByteLink&, std::uint32_t nonce);
 
 }  // namespace moldloft::firmware_like

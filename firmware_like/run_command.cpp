@@ -16,11 +16,13 @@
 #include "firmware_like/operator_channel.hpp"
 #include "firmware_like/plate_name.hpp"
 #include "firmware_like/recorder_thread.hpp"
+#include "firmware_like/service_notify.hpp"
 #include "firmware_like/service_thread.hpp"
 #include "firmware_like/stop_signals.hpp"
 #include "firmware_like/timing_report.hpp"
 #include "firmware_like/timing_table.hpp"
 #include "hal/cable.hpp"
+#include "hal/printable_text.hpp"
 #include "hal/serial_link.hpp"
 #include "hal/tcp_link.hpp"
 
@@ -90,6 +92,19 @@ std::string how_it_ended(const Controller& controller, const RunOptions& options
                      again);
 }
 
+// Nothing is left to measure: neither the devices nor the folder are touched. A service manager that waits for READY
+// would otherwise take the end for a failure, and start again and again.
+int say_complete(const std::filesystem::path& out) {
+  const std::string line = fmt::format(
+      "{0}: this run is complete, nothing is left to measure; `moldloft report {0}` shows it, another plate "
+      "needs "
+      "another --out",
+      out.string());
+  ServiceNotify{}.ready(line);
+  complain(line);
+  return exit_done;
+}
+
 // The same for a run that ended before the arm was sent anywhere: nothing was measured, nothing is kept.
 std::string why_refused(const Controller& controller) {
   const auto& cell = controller.cell();
@@ -103,6 +118,9 @@ std::uint32_t fresh_epoch() {
   std::random_device device;
   return (device() ^ static_cast<std::uint32_t>(std::time(nullptr))) & 0xFFFFFu;
 }
+
+// A SYN that answers an earlier program must not pass for an answer to this one.
+std::uint32_t fresh_nonce() { return std::random_device{}() & hal::robot_line::largest_nonce; }
 
 // When the run began; stores of before that was kept do not know.
 std::string begun_of(const hal::RunStore& store) { return store.meta("begun").value_or(""); }
@@ -125,7 +143,14 @@ std::expected<RunNames, std::string> names_given(const RunOptions& options) {
 }  // namespace
 
 int complain(std::string_view what, std::string_view program) {
-  say(fmt::format("{}: {}\n", program, what));
+  // Several errors of a configuration stand on a line each.
+  std::string lines;
+  for (std::size_t begin = 0; begin <= what.size();) {
+    const std::size_t end = std::min(what.find('\n', begin), what.size());
+    lines += (begin == 0 ? "" : "\n") + hal::printable(what.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  say(fmt::format("{}: {}\n", program, lines));
   return exit_failed;
 }
 
@@ -143,9 +168,9 @@ int exit_code(const Controller& controller) {
 }
 
 std::string result_table(const Json& s, const std::string& folder) {
-  std::string t = fmt::format("\n{:<28}{}\n", "result", s["result"].get<std::string>());
+  std::string t = fmt::format("\n{:<28}{}\n", "result", hal::printable(s["result"].get<std::string>()));
   const auto row = [&](std::string_view name, const std::string& value) {
-    t += fmt::format("{:<28}{}\n", name, value);
+    t += fmt::format("{:<28}{}\n", name, hal::printable(value));
   };
   for (const char* key : {"plate", "cell", "remark"}) {
     if (const std::string text = s.value(key, ""); !text.empty()) row(key, text);
@@ -259,6 +284,7 @@ int run_cell(const RunOptions& options) {
   const auto names = names_given(options);
   if (!names) return complain(names.error());
   const bool resume = options.resume || (options.resume_held && holds_run(options.out));
+  if (resume && holds_complete_run(options.out)) return say_complete(options.out);
   StopSignals signals;
   const auto devices = claim_cell(*config);
   if (!devices) return complain(devices.error());
@@ -280,6 +306,7 @@ int run_cell(const RunOptions& options) {
       std::make_unique<Controller>(*config, clock, *scanner_link, *robot_link,
                                    ControllerOptions{.archive = folder->archive.get(),
                                                      .epoch = fresh_epoch(),
+                                                     .nonce = fresh_nonce(),
                                                      .begin_held = options.resume_held,
                                                      .attended = operator_socket.has_value()});
   signals.stops(controller.get());

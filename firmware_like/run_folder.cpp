@@ -13,6 +13,7 @@
 #include "firmware_like/config.hpp"
 #include "firmware_like/flight_files.hpp"
 #include "firmware_like/plate_name.hpp"
+#include "firmware_like/surface_file.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -90,6 +91,14 @@ bool holds_run(const fs::path& path) {
 bool holds_results(const fs::path& path) {
   std::error_code failed;
   return fs::exists(path / "summary.json", failed) || fs::exists(path / "surface.json", failed);
+}
+
+// summary.json is written last: where it says complete, everything else is there too.
+bool holds_complete_run(const fs::path& path) {
+  std::error_code failed;
+  if (!holds_run(path) || !fs::exists(path / "summary.json", failed)) return false;
+  const auto summary = read_json(path / "summary.json");
+  return summary && summary->is_object() && summary->value("result", Json{}) == "complete";
 }
 
 std::expected<RunFolder, RunError> create_run(const fs::path& asked, const std::string& config_text,

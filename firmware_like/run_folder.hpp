@@ -74,7 +74,8 @@ std::expected<bool, RunError> bring_back(const RunFolder&);
 void discard_run(RunFolder);
 
 bool holds_run(const std::filesystem::path&);
-bool holds_results(const std::filesystem::path&);  // of a run, or of a fit
-std::string now_utc();                             // "2026-01-31T12:00:00Z"
+bool holds_complete_run(const std::filesystem::path&);  // measured, and its results are written
+bool holds_results(const std::filesystem::path&);       // of a run, or of a fit
+std::string now_utc();                                  // "2026-01-31T12:00:00Z"
 
 }  // namespace moldloft::firmware_like

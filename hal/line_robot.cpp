@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cassert>
+#include <optional>
 #include <utility>
+
+#include "hal/printable_text.hpp"
 
 namespace moldloft::hal {
 
@@ -19,6 +22,8 @@ constexpr std::size_t bytes_a_tick = 1024;  // a line of 115200 baud brings 12 i
 
 // 8N1: ten bits a character. The longest line out and the longest answer back.
 constexpr Duration time_of_two_lines(int baud) { return 2 * max_length * 10 * Duration{1s} / baud; }
+
+constexpr const char* in_manual_mode = "robot: it is in manual mode; switch it to automatic, then clear";
 
 Message text_of_event(int code) {
   switch (static_cast<Event>(code)) {
@@ -46,6 +51,8 @@ Message text_of_error(int code) {
       return "the motion was stopped before it arrived";
     case Error::arm_off:
       return "robot refuses: arm power is off";
+    case Error::manual:
+      return in_manual_mode;
   }
   return Message::format("robot: error {} (the controller's own number)", code);
 }
@@ -145,7 +152,10 @@ void LineRobot::cue(Cue what, Instant now) {
 
 // ---- what the cell asks
 
-void LineRobot::start(Instant now) { cue(Cue::start, now); }
+void LineRobot::start(Instant now) {
+  if (phase_ == Phase::idle) why_ = "the robot has not answered SYN yet";
+  cue(Cue::start, now);
+}
 void LineRobot::reset(Instant now) { cue(Cue::reset, now); }
 
 bool LineRobot::move(const Pose& target, int speed_percent, Instant now) {
@@ -221,7 +231,8 @@ void LineRobot::report_loss(Instant now) {
 
 // The port is still there: the robot's program may only be restarting. SYN goes out until it answers.
 void LineRobot::report_silence(Instant now) {
-  why_ = Message::format("the robot has been silent for {} ms", (now - heard_at_) / 1ms);
+  why_ = instead_of_lines().value_or(
+      Message::format("the robot has been silent for {} ms", (now - heard_at_) / 1ms));
   if (std::exchange(announced_, false))
     events_.push({.kind = RobotEvent::Kind::lost, .pose = pose_, .text = why_});
   start_sync(now);
@@ -229,14 +240,15 @@ void LineRobot::report_silence(Instant now) {
 
 void LineRobot::start_sync(Instant now) {
   latched_ = false;
-  ++nonce_;
+  nonce_ = nonce_ >= largest_nonce ? 0 : nonce_ + 1;
   number_ = 0;
   send_syn(now);
 }
 
 // The same nonce again: an answer that comes late still counts.
 void LineRobot::send_syn(Instant now) {
-  if (now - heard_at_ > settings_.silent_limit) why_ = "the robot does not answer SYN";
+  if (now - heard_at_ > settings_.silent_limit)
+    why_ = instead_of_lines().value_or("the robot does not answer SYN");
   answer_due_ = now + answer_time_;
   send(format(Command{.verb = Verb::syn, .nonce = nonce_}), now);
 }
@@ -247,6 +259,7 @@ void LineRobot::ask_status(Instant now) {
 }
 
 void LineRobot::send_stop_and_wait(Instant now) {
+  why_ = "the robot says that it moves; STP was sent, and no motion before it stands";
   answer_due_ = now + answer_time_;
   ask(Verb::stp, now);
 }
@@ -336,6 +349,7 @@ void LineRobot::receive(Instant now) {
   }
   std::array<std::byte, bytes_a_tick> bytes;
   const std::size_t count = link_.read(bytes);
+  unread_ += count;
   take_bytes(std::span{bytes}.first(count), now);
 }
 
@@ -345,7 +359,7 @@ void LineRobot::take_bytes(std::span<const std::byte> bytes, Instant now) {
     if (c == '\r') continue;  // V+ writes CR LF
     if (c == '\n') {
       if (overlong_) {
-        garbled(now);
+        garbled({incoming_.data(), incoming_size_}, Flaw::length, now);
       } else if (incoming_size_ > 0) {
         take_line({incoming_.data(), incoming_size_}, now);
       }
@@ -361,11 +375,9 @@ void LineRobot::take_bytes(std::span<const std::byte> bytes, Instant now) {
 
 void LineRobot::take_line(std::string_view line, Instant now) {
   const auto reply = parse_reply(line);
-  if (!reply) {
-    garbled(now);
-    return;
-  }
+  if (!reply) return garbled(line, reply.error(), now);
   heard_at_ = now;
+  unread_ = shown_size_ = 0;
   switch (reply->verb) {
     case Verb::nak:
       return on_refusal(*reply, now);
@@ -379,15 +391,36 @@ void LineRobot::take_line(std::string_view line, Instant now) {
 
 // Whatever it was, the same line again brings it back; soon, but not so soon that noise and repeats feed each
 // other.
-void LineRobot::garbled(Instant now) {
+void LineRobot::garbled(std::string_view line, Flaw flaw, Instant now) {
   ++garbled_lines_;
+  flaw_ = flaw;
+  shown_size_ = line.copy(shown_.data(), shown_.size());
+  // SYN was answered, so the line is good: what comes now is of another form than it should have.
+  if (phase_ == Phase::checking || phase_ == Phase::locating) why_ = *instead_of_lines();
   answer_due_ = std::min(answer_due_, now + settings_.garble_pause);
+}
+
+// What has come since the last line that could be read.
+std::optional<Message> LineRobot::instead_of_lines() const {
+  if (unread_ == 0) return std::nullopt;
+  const bool no_line_end = shown_size_ == 0 || overlong_;
+  const std::string_view shown =
+      no_line_end ? std::string_view{incoming_.data(), incoming_size_}.substr(0, shown_of_line)
+                  : std::string_view{shown_.data(), shown_size_};
+  return Message::format("the robot's answer cannot be read, {} ({} characters): \"{}\"",
+                         no_line_end ? "it has no line end" : to_string(flaw_), unread_,
+                         printable_text<2 * shown_of_line>(shown).view());
 }
 
 void LineRobot::on_answer(const Reply& reply, Instant now) {
   switch (reply.answers) {
     case Verb::syn:
-      if (reply.nonce == nonce_) cue(Cue::synced, now);
+      if (reply.nonce == nonce_)
+        cue(Cue::synced, now);
+      else if (phase_ == Phase::syncing)
+        why_ =
+            Message::format("the robot answers SYN {} with SYN {}: it must send the number back as it came",
+                            nonce_, reply.nonce);
       break;
     case Verb::sta:
       on_status(reply.status, now);
@@ -412,6 +445,8 @@ void LineRobot::on_status(const Status& status, Instant now) {
           text_of_event(std::to_underlying(Event::emergency_stop)));
   } else if (!status.power) {
     fault(now, std::to_underlying(Event::power_lost), text_of_event(std::to_underlying(Event::power_lost)));
+  } else if (status.mode == Status::Mode::manual) {
+    fault(now, std::to_underlying(Error::manual), in_manual_mode);  // whoever has the pendant has the arm
   } else {
     cue(status.moving ? Cue::in_motion : Cue::stands_still, now);
   }
@@ -427,7 +462,7 @@ void LineRobot::on_numbered(const Reply& reply, Instant now) {
       return cue(Cue::done, now);
     case Verb::err:
       // After ACK the arm was on its way: where it stands now nobody planned, unless a stop was asked for.
-      if (phase_ == Phase::moving && !stop_requested_)
+      if ((phase_ == Phase::moving && !stop_requested_) || reply.code == std::to_underlying(Error::manual))
         return fault(now, reply.code, text_of_error(reply.code));
       code_ = reply.code;
       return cue(Cue::error, now);

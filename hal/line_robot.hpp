@@ -12,6 +12,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 
 #include "hal/byte_link.hpp"
 #include "hal/event_queue.hpp"
@@ -34,7 +35,9 @@ class LineRobot final : public Robot {
     Duration connect_timeout = 2s;  // where the line is a terminal server's socket
     Duration first_back_off = 100ms;  // of opening the port again; doubles with each failure
     Duration last_back_off = 2s;
-    std::uint32_t first_nonce = 1;  // of SYN; each SYN of this object counts on
+    // Of SYN; each time that SYN begins anew counts on. The program gives another one at each start: an answer to an
+    // earlier program must not pass for one to this.
+    std::uint32_t first_nonce = 1;
   };
 
   LineRobot(ByteLink&, const Settings&);
@@ -56,6 +59,9 @@ class LineRobot final : public Robot {
   std::uint64_t repeated_lines() const { return repeated_lines_; }  // sent again because no answer came
 
  private:
+  static constexpr std::size_t shown_of_line =
+      40;  // of a line in a message: verb and fields, with room for the reason
+
   enum class Phase { idle, waiting, opening, syncing, checking, locating, ready, commanded, moving, faulted };
   enum class Cue {
     start,
@@ -114,13 +120,14 @@ class LineRobot final : public Robot {
   // what arrives
   void take_bytes(std::span<const std::byte> bytes, Instant now);
   void take_line(std::string_view line, Instant now);
-  void garbled(Instant now);
+  void garbled(std::string_view line, robot_line::Flaw, Instant now);
   void on_answer(const robot_line::Reply&, Instant now);
   void on_status(const robot_line::Status&, Instant now);
   void on_numbered(const robot_line::Reply&, Instant now);
   void on_refusal(const robot_line::Reply&, Instant now);
   void fault(Instant now, int code, const Message& text);
 
+  std::optional<Message> instead_of_lines() const;
   void watch(Instant now);
   bool is_open() const { return phase_ > Phase::opening; }
   bool has_command() const { return phase_ == Phase::commanded || phase_ == Phase::moving; }
@@ -157,7 +164,11 @@ class LineRobot final : public Robot {
 
   std::array<char, robot_line::max_length> incoming_{};
   std::size_t incoming_size_ = 0;
-  bool overlong_ = false;  // the line on its way is too long: nothing of it counts
+  bool overlong_ = false;                    // the line on its way is too long: nothing of it counts
+  std::uint64_t unread_ = 0;                 // characters since the last line that could be read
+  std::array<char, shown_of_line> shown_{};  // of the last line that could not, its beginning
+  std::size_t shown_size_ = 0;
+  robot_line::Flaw flaw_{};  // of that line
   std::array<std::byte, 1024> outgoing_{};
   std::size_t outgoing_size_ = 0;
   std::uint64_t garbled_lines_ = 0, repeated_lines_ = 0;

@@ -239,8 +239,12 @@ std::expected<FrameHead, Flaw> decode_frame_head(std::span<const std::byte> payl
   for (float& offset : head.offset) offset = from.get<float>();
   const auto good_scale = [](float scale) { return std::isfinite(scale) && scale > 0; };
   const auto good_offset = [](float offset) { return std::isfinite(offset); };
+  // The farthest that a value can stand for must be a number too, or points that were sent would be at infinity.
+  bool in_reach = true;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    in_reach = in_reach && std::isfinite(std::abs(head.offset[axis]) + (largest + 1) * head.scale[axis]);
   if (encoding > 1 || intensity > 1 || !std::ranges::all_of(head.scale, good_scale) ||
-      !std::ranges::all_of(head.offset, good_offset)) {
+      !std::ranges::all_of(head.offset, good_offset) || !in_reach) {
     return std::unexpected{Flaw::content};
   }
   return head;

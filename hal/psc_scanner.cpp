@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <utility>
+
+#include "hal/printable_text.hpp"
 
 namespace moldloft::hal {
 
@@ -89,7 +92,10 @@ void PscScanner::cue(Cue what, Instant now) {
 
 // ---- what the cell asks
 
-void PscScanner::start(Instant now) { cue(Cue::start, now); }
+void PscScanner::start(Instant now) {
+  if (phase_ == Phase::idle) why_ = "its link is not open yet";
+  cue(Cue::start, now);
+}
 
 bool PscScanner::trigger(std::uint32_t shot_id, Instant now) {
   if (phase_ != Phase::ready || shot_id == 0) return false;  // 0 stands for no shot on the wire
@@ -161,6 +167,7 @@ void PscScanner::announce(Instant now) {
   back_off_ = 0ns;
   pinged_at_ = now;
   announced_ = true;
+  refused_ = false;
   why_ = "";
   events_.push({ScannerEvent::Kind::ready, 0, {}});
 }
@@ -180,6 +187,7 @@ void PscScanner::announce_and_fail(Instant now) {
 
 void PscScanner::send_trigger(Instant now) {
   ++shot_.attempts;
+  was_busy_ = false;
   ask_again_at_.reset();
   deadline_ = now + (phase_ == Phase::exposing ? settings_.exposure_timeout : settings_.frame_timeout);
   send(Trigger{.shot_id = shot_.id});
@@ -320,6 +328,13 @@ std::size_t PscScanner::read_some(std::size_t budget) {
 
 bool PscScanner::take_header(Instant now) {
   const auto head = decode_header(incoming_.header);
+  if (!head && head.error() == Flaw::magic) {
+    ++broken_streams_;
+    const auto* begin = reinterpret_cast<const char*>(incoming_.header.data());
+    lose(now, Message::format("what comes from the scanner's port is no PSC1; it begins with \"{}\"",
+                              printable_text<48>({begin, incoming_.header.size()}).view()));
+    return false;
+  }
   if (!head) {
     broken(now, "header", head.error());
     return false;
@@ -363,19 +378,15 @@ void PscScanner::on_hello(std::span<const std::byte> payload, Instant now) {
   if (phase_ != Phase::greeting) return;
   const auto hello = decode_hello_reply(payload);
   if (!hello) return broken(now, "HELLO", hello.error());
-  if (hello->status != Status::ok || hello->version != protocol_version) {
-    return lose(now, Message::format("the scanner does not speak version {} of PSC1", protocol_version));
+  if (hello->status != Status::ok && hello->status != Status::unsupported) {
+    return lose(now, Message::format("the scanner answers HELLO with {} (status {})",
+                                     to_string(hello->status), std::to_underlying(hello->status)));
   }
+  if (const auto why = unfit(*hello)) return refuse(now, *why);
   const auto points = std::uint32_t{hello->max_stripes} * hello->max_points_per_stripe;
-  if (hello->max_stripes > settings_.max_stripes || points > settings_.max_points) {
-    return lose(
-        now,
-        Message::format("the scanner's frames ({} stripes, {} points) exceed the limits ({}, {}): raise them",
-                        hello->max_stripes, points, settings_.max_stripes, settings_.max_points));
-  }
   const auto* name_end = std::ranges::find(hello->sensor, '\0');
   info_.sensor =
-      std::string_view{hello->sensor.data(), static_cast<std::size_t>(name_end - hello->sensor.begin())};
+      printable_text<16>({hello->sensor.data(), static_cast<std::size_t>(name_end - hello->sensor.begin())});
   info_.session_id = hello->session_id;
   info_.max_stripes = hello->max_stripes;
   info_.max_points = points;
@@ -385,13 +396,37 @@ void PscScanner::on_hello(std::span<const std::byte> payload, Instant now) {
   cue(Cue::greeted, now);
 }
 
+// What no second HELLO will change.
+std::optional<Message> PscScanner::unfit(const HelloReply& hello) const {
+  if (hello.status == Status::unsupported || hello.version != protocol_version)
+    return Message::format("the scanner does not speak version {} of PSC1", protocol_version);
+  const auto points = std::uint32_t{hello.max_stripes} * hello.max_points_per_stripe;
+  if (hello.max_stripes > settings_.max_stripes || points > settings_.max_points) {
+    return Message::format(
+        "the scanner's frames have {} stripes of {} points, more than [scanner] max_stripes, "
+        "max_points_per_stripe allow ({} points): raise them",
+        hello.max_stripes, hello.max_points_per_stripe, settings_.max_points);
+  }
+  const auto is_length = [](float mm) { return std::isfinite(mm) && mm > 0; };
+  if (points == 0 || hello.session_id == 0 || !is_length(hello.field_x_mm) || !is_length(hello.field_y_mm) ||
+      !is_length(hello.depth_mm)) {
+    return Message::format(
+        "the scanner's HELLO cannot be true: {} stripes of {} points, field {:.6g} x {:.6g} mm, depth {:.6g} "
+        "mm, "
+        "session {}",
+        hello.max_stripes, hello.max_points_per_stripe, hello.field_x_mm, hello.field_y_mm, hello.depth_mm,
+        hello.session_id);
+  }
+  return std::nullopt;
+}
+
 void PscScanner::on_config(std::span<const std::byte> payload, Instant now) {
   if (phase_ != Phase::configuring) return;
   const auto config = decode_config(payload);
   if (!config) return broken(now, "CONFIG", config.error());
   if (config->status != Status::ok) {
-    return lose(now, Message::format("the scanner refuses the configuration (status {})",
-                                     std::to_underlying(config->status)));
+    return lose(now, Message::format("the scanner answers CONFIG with {} (status {})",
+                                     to_string(config->status), std::to_underlying(config->status)));
   }
   cue(Cue::configured, now);
 }
@@ -423,6 +458,11 @@ void PscScanner::on_frame(std::span<const std::byte> payload, Instant now) {
     ++stale_frames_;
     return;
   }
+  if (head->stripe_count > info_.max_stripes || head->point_count > info_.max_points) {
+    return lose(
+        now, Message::format("FRAME of {} stripes with {} points; the scanner's HELLO said {} and {} at most",
+                             head->stripe_count, head->point_count, info_.max_stripes, info_.max_points));
+  }
   if (!std::exchange(arriving_, false)) {
     const auto begun = begin_frame(payload, frame_);
     if (!begun) return broken(now, "FRAME", begun.error());
@@ -440,10 +480,11 @@ void PscScanner::on_frame(std::span<const std::byte> payload, Instant now) {
 void PscScanner::on_error(std::span<const std::byte> payload, Instant now) {
   const auto error = decode_error(payload);
   if (!error) return broken(now, "ERROR", error.error());
-  const auto text =
-      Message::format("scanner: {} (status {})", error->text.view(), std::to_underlying(error->status));
+  const auto text = Message::format("scanner: {} ({}, status {})", error->text.view(),
+                                    to_string(error->status), std::to_underlying(error->status));
   const bool of_our_shot = shot_.outstanding && error->shot_id == shot_.id;
   if (error->status == Status::busy && of_our_shot) {
+    was_busy_ = true;
     ask_again_at_ = now + settings_.busy_pause;
   } else if (error->status == Status::bad_state || phase_ == Phase::greeting ||
              phase_ == Phase::configuring) {
@@ -473,15 +514,16 @@ void PscScanner::watch(Instant now) {
       return;
     case Phase::greeting:
     case Phase::configuring:
-      if (now >= deadline_) lose(now, "the scanner does not answer the greeting");
+      if (now >= deadline_)
+        lose(now, phase_ == Phase::greeting ? "the scanner does not answer HELLO"
+                                            : "the scanner does not answer CONFIG");
       return;
     case Phase::ready:
       break;
     case Phase::exposing:
     case Phase::computing:
       if (now >= deadline_) {
-        failure_ = phase_ == Phase::exposing ? "the scanner did not expose in time"
-                                             : "the frame did not come in time";
+        failure_ = phase_ == Phase::exposing ? why_not_exposed() : why_no_frame();
         cue(Cue::late, now);
       } else if (ask_again_at_ && now >= *ask_again_at_) {
         ask_again_at_.reset();
@@ -511,9 +553,34 @@ void PscScanner::flush() {
   outgoing_size_ -= count;
 }
 
-void PscScanner::lose(Instant now, Message why) {
+void PscScanner::lose(Instant now, const Message& why) {
   why_ = why;
   cue(Cue::link_lost, now);
+}
+
+void PscScanner::refuse(Instant now, const Message& why) {
+  if (!std::exchange(refused_, true)) events_.push({ScannerEvent::Kind::unfit, 0, why});
+  lose(now, why);
+}
+
+// A frame on its way keeps back whatever is said behind it.
+Message PscScanner::why_no_frame() const {
+  const auto limit_ms = settings_.frame_timeout / 1ms;
+  if (incoming_.payload_offset == 0 || incoming_.head.type != Type::frame)
+    return Message::format("the frame is late: nothing of it has come {} ms after it was asked for",
+                           limit_ms);
+  return Message::format("the frame is late: {} of its {} bytes have come {} ms after it was asked for",
+                         incoming_.body_have, incoming_.head.payload_length, limit_ms);
+}
+
+Message PscScanner::why_not_exposed() const {
+  if (incoming_.payload_offset != 0 && incoming_.head.type == Type::frame) return why_no_frame();
+  if (was_busy_)
+    return Message::format(
+        "the scanner is still BUSY with the shot before: its frames take longer than the {} ms "
+        "that they have",
+        settings_.frame_timeout / 1ms);
+  return Message::format("the scanner did not expose within {} ms", settings_.exposure_timeout / 1ms);
 }
 
 // A stream that once went wrong is never trusted again: no hunting for the next magic.

@@ -43,7 +43,7 @@ class PscScanner final : public Scanner {
     // receive() costs.
     std::size_t bytes_a_tick = 32u << 10;
     std::size_t points_a_tick = 2048;  // unpacked by receive() where nobody asks for them
-    std::uint32_t max_stripes = 200;   // of one frame; larger ones are refused at CONFIG
+    std::uint32_t max_stripes = 200;   // of one frame; a sensor with larger ones is refused at HELLO
     std::uint32_t max_points = 100'000;
   };
 
@@ -158,7 +158,11 @@ class PscScanner final : public Scanner {
 
   void watch(Instant now);
   void flush();
-  void lose(Instant now, Message why);
+  void lose(Instant now, const Message& why);
+  void refuse(Instant now, const Message& why);
+  std::optional<Message> unfit(const psc1::HelloReply&) const;
+  Message why_not_exposed() const;
+  Message why_no_frame() const;
   void broken(Instant now, std::string_view what, psc1::Flaw);
   template <typename M>
   void send(const M& message);
@@ -176,6 +180,8 @@ class PscScanner final : public Scanner {
   Phase phase_ = Phase::idle;
   Shot shot_;
   bool announced_ = false;               // ready was reported and not taken back by lost
+  bool refused_ = false;                 // unfit was reported, and ready not since then
+  bool was_busy_ = false;                // the present attempt was answered by BUSY
   Instant wait_until_{0};                // end of the back-off
   Instant deadline_{0};                  // of the answer that the phase waits for
   std::optional<Instant> ask_again_at_;  // after BUSY

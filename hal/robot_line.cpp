@@ -32,8 +32,6 @@ constexpr std::array<std::pair<Verb, std::string_view>, 12> verbs{{{Verb::mov, "
 constexpr std::array<std::pair<Refusal, std::string_view>, 3> refusals{
     {{Refusal::checksum, "CK"}, {Refusal::sequence, "SQ"}, {Refusal::not_synchronised, "SY"}}};
 
-// V+ keeps numbers in single precision: integers are exact up to here.
-constexpr std::int64_t largest_nonce = (1 << 24) - 1;
 constexpr std::int64_t largest_code = 999'999;
 // Six digits before the point: 999.999 m and 999,999 degrees are far beyond any arm, and six such fields fit
 // a line.

@@ -21,13 +21,24 @@ namespace moldloft::hal::robot_line {
 
 constexpr std::size_t max_length = 120;  // a V+ string holds 128 characters
 constexpr int last_number = 9999;        // 0001 follows 9999; 0000 marks the lines that change nothing
+// V+ keeps numbers in single precision: integers are exact up to here.
+constexpr std::uint32_t largest_nonce = (1u << 24) - 1;
 
 using Line = FixedText<max_length + 1>;  // with its LF
 
 enum class Verb {
-  mov, cal,                 // host, numbered: change something
-  syn, png, sta, pos, stp,  // host, 0000: harmless, answered at any time
-  ack, don, err, nak, evt,  // robot
+  mov,
+  cal,  // host, numbered: change something
+  syn,
+  png,
+  sta,
+  pos,
+  stp,  // host, 0000: harmless, answered at any time
+  ack,
+  don,
+  err,
+  nak,
+  evt,  // robot
 };
 
 enum class Refusal { checksum, sequence, not_synchronised };  // NAK CK, NAK SQ last, NAK SY
@@ -44,9 +55,9 @@ struct Status {
 struct Command {  // a host line
   int number = 0;
   Verb verb = Verb::png;
-  Pose pose{};             // MOV
-  int speed_percent = 0;   // MOV
-  std::uint32_t nonce = 0; // SYN
+  Pose pose{};              // MOV
+  int speed_percent = 0;    // MOV
+  std::uint32_t nonce = 0;  // SYN
 };
 
 // What EVT says, unasked, once a second until the next SYN. Positive, so that they never meet V+'s own error
@@ -54,25 +65,32 @@ struct Command {  // a host line
 enum class Event : int { emergency_stop = 1, power_lost = 2, watchdog = 3, motion_failed = 4 };
 
 // What ERR says where the controller has no number of its own for it.
-enum class Error : int { out_of_reach = 1, bad_value = 2, not_calibrated = 3, stopped = 4, arm_off = 5 };
+enum class Error : int {
+  out_of_reach = 1,
+  bad_value = 2,
+  not_calibrated = 3,
+  stopped = 4,
+  arm_off = 5,
+  manual = 6
+};
 
 // An answer to a 0000 line has number 0, verb ack and the question in `answers`; on the wire it begins with
 // the question's own verb ("<0000 STA 1 0 0 2 0").
 struct Reply {  // a robot line
   int number = 0;
   Verb verb = Verb::ack;
-  Pose pose{};              // DON, and the answer to POS
+  Pose pose{};  // DON, and the answer to POS
   bool has_pose = false;
-  Verb answers = Verb::ack; // for 0000 lines: which question is answered (syn, png, sta, pos, stp)
-  Status status{};          // STA
-  std::uint32_t nonce = 0;  // SYN
-  int code = 0;             // ERR, EVT
-  Refusal refusal{};        // NAK
-  int last_number = 0;      // NAK SQ
+  Verb answers = Verb::ack;  // for 0000 lines: which question is answered (syn, png, sta, pos, stp)
+  Status status{};           // STA
+  std::uint32_t nonce = 0;   // SYN
+  int code = 0;              // ERR, EVT
+  Refusal refusal{};         // NAK
+  int last_number = 0;       // NAK SQ
 };
 
 enum class Flaw { none, start, length, characters, checksum, number, verb, fields };
-std::string_view to_string(Flaw);
+std::string_view to_string(Flaw) MOLDLOFT_NONBLOCKING;
 
 std::uint16_t fletcher16(std::string_view text) noexcept;  // "abcde" gives 51440
 

@@ -34,10 +34,11 @@ struct ScannerEvent {
     frame,
     shot_failed,
     lost,
+    unfit,  // it is there, and what it says of itself does not fit the driver or its settings: asking again is no use
   };
   Kind kind;
   std::uint32_t shot_id = 0;
-  Message text{};  // for shot_failed and lost: what happened
+  Message text{};  // for shot_failed, lost and unfit: what happened
 };
 
 struct ScannerInfo {

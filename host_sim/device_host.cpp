@@ -7,6 +7,7 @@
 #include "firmware_like/console.hpp"
 #include "firmware_like/results.hpp"
 #include "hal/cable.hpp"
+#include "hal/printable_text.hpp"
 #include "hal/serial_link.hpp"
 #include "host_sim/cell_config.hpp"
 #include "host_sim/paced_link.hpp"

@@ -56,6 +56,11 @@ void RobotServer::switch_power(bool on, hal::Instant now) {
   power_ = on;
 }
 
+void RobotServer::turn_key(bool manual, hal::Instant now) {
+  manual_ = manual;
+  if (manual) abort_work(Error::manual, now);
+}
+
 void RobotServer::receive(hal::Instant now) {
   std::array<std::byte, 256> bytes;
   while (const std::size_t count = link_.read(bytes)) {
@@ -104,8 +109,9 @@ void RobotServer::answer_question(const robot_line::Command& question, hal::Inst
       reply.status.power = power_ && !emergency_stop_;
       reply.status.emergency_stop = emergency_stop_;
       reply.status.moving = !stands(now);
-      reply.status.mode =
-          calibrated_ ? robot_line::Status::Mode::calibrated : robot_line::Status::Mode::automatic;
+      reply.status.mode = manual_       ? robot_line::Status::Mode::manual
+                          : calibrated_ ? robot_line::Status::Mode::calibrated
+                                        : robot_line::Status::Mode::automatic;
       reply.status.last_error = last_error_;
       break;
     case Verb::pos:
@@ -141,6 +147,7 @@ void RobotServer::execute(const robot_line::Command& command, hal::Instant now) 
     last_refusal_ = why;
   };
   if (emergency_stop_ || !power_) return failed(Error::arm_off, "the arm has no power");
+  if (manual_) return failed(Error::manual, "the arm is in manual mode");
   if (command.verb == Verb::cal) {
     ++counters_.calibrations;
     if (calibrated_) return begin_work(now, now, now);

@@ -37,6 +37,8 @@ class RobotServer {
   void step(hal::Instant now);
   void power_cycle(hal::Instant now);
   void press_emergency_stop(hal::Instant now);
+  // The key on the controller: in manual mode nothing that the host sends moves the arm.
+  void turn_key(bool manual, hal::Instant now);
   void release_emergency_stop() noexcept { emergency_stop_ = false; }
   void switch_power(bool on, hal::Instant now);
 
@@ -77,6 +79,7 @@ class RobotServer {
   RobotCounters counters_;
 
   bool connected_ = false, synchronised_ = false, calibrated_ = false, power_ = true, emergency_stop_ = false;
+  bool manual_ = false;
   int last_error_ = 0;
   int last_number_ = 0;
   Fate fate_ = Fate::none;

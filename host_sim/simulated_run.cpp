@@ -96,12 +96,14 @@ std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& option
   SimulatedWorld world{options.cell, *plate, scanner_cable.device(), robot_cable.device()};
   clock.carry(world);
   if (options.real_time) clock.pace_by_wall();
-  const auto controller = std::make_unique<Controller>(
-      *config, clock, scanner_cable.host(), robot_cable.host(),
-      firmware_like::ControllerOptions{.archive = folder->archive.get(),
-                                       .epoch = options.resume ? folder->archive->last_epoch() + 1 : 1,
-                                       .begin_held = options.held,
-                                       .attended = options.held});
+  const std::uint32_t epoch = options.resume ? folder->archive->last_epoch() + 1 : 1;
+  const auto controller =
+      std::make_unique<Controller>(*config, clock, scanner_cable.host(), robot_cable.host(),
+                                   firmware_like::ControllerOptions{.archive = folder->archive.get(),
+                                                                    .epoch = epoch,
+                                                                    .nonce = epoch,
+                                                                    .begin_held = options.held,
+                                                                    .attended = options.held});
   run_to_rest(*controller, {world, scanner_cable, robot_cable, *controller, *folder->store}, clock, options);
 
   const firmware_like::RunLabel label{

@@ -26,6 +26,21 @@ bool is_ending(CellState state) {
          state == CellState::aborted || state == CellState::clearing;
 }
 
+// A scanner that is lost comes back by itself, or does not: the line says what is waited for and how to end it.
+hal::Message waiting_for_scanner(std::string_view why, Duration limit) MOLDLOFT_NONBLOCKING {
+  if (limit == Duration::max())
+    return hal::Message::format("{:.100}; waiting until it is back (stop ends the run)", why);
+  return hal::Message::format("{:.100}; waiting {} s for it to come back (ctrl-C ends the run)", why,
+                              limit / 1s);
+}
+
+// Of the device that is missing: its driver says why, and may have named it already.
+hal::Message why_not_ready(std::string_view device, std::string_view why) MOLDLOFT_NONBLOCKING {
+  const bool names_it =
+      why.starts_with(device) || (why.starts_with("the ") && why.substr(4).starts_with(device));
+  return names_it ? hal::Message{why} : hal::Message::format("{}: {}", device, why);
+}
+
 }  // namespace
 
 Cell::Cell(const CellSettings& settings, Clock& clock, hal::Scanner& scanner, hal::Robot& robot,
@@ -161,11 +176,11 @@ void Cell::on_robot(const hal::RobotEvent& event) {
     case Kind::moving:
       break;
     case Kind::done:
-      standing_ = event.pose;
       if (state_ == CellState::starting && start_step_ == StartStep::calibrating) {
+        standing_ = event.pose;
         calibrated_ = true;
       } else {
-        apply(ShotEvent::arrived);
+        on_arrival(event.pose);
       }
       break;
     case Kind::refused:
@@ -199,11 +214,26 @@ void Cell::on_robot(const hal::RobotEvent& event) {
   }
 }
 
+// A pose far from the target is no place to take a shot at: it would be registered there.
+void Cell::on_arrival(const hal::Pose& reported) {
+  standing_ = reported;
+  if (const auto no = refuse_arrival(reported, arm_.commanded, settings_.arrival); no && !is_ending(state_)) {
+    record("robot", "implausible", "", "", *no);
+    arrival_doubted_ = true;
+    return hold(HoldCause::person, *no);
+  }
+  apply(ShotEvent::arrived);
+}
+
+// Another scanner may have come on the same address; one that is there and does not fit needs a person.
 void Cell::on_scanner(const hal::ScannerEvent& event) {
   using Kind = hal::ScannerEvent::Kind;
   switch (event.kind) {
     case Kind::ready:
       record("scanner", "ready", "", "");
+      if (state_ != CellState::starting) {
+        if (const auto no = refuse_scanner()) hold(HoldCause::person, *no);
+      }
       break;
     case Kind::exposed:
       if (shot_state_ == ShotState::exposing && event.shot_id == arm_.shot_id) apply(ShotEvent::exposed);
@@ -222,7 +252,12 @@ void Cell::on_scanner(const hal::ScannerEvent& event) {
     case Kind::lost:
       record("scanner", "lost", "", "", event.text);
       drop_look();
-      hold(HoldCause::scanner, event.text);
+      hold(HoldCause::scanner, waiting_for_scanner(event.text, settings_.scanner_wait));
+      break;
+    case Kind::unfit:
+      record("scanner", "unfit", "", "", event.text);
+      if (state_ == CellState::starting) return abort(event.text, HoldCause::measurement);
+      hold(HoldCause::person, event.text);
       break;
   }
 }
@@ -237,7 +272,7 @@ void Cell::advance_state() {
     case CellState::starting:
       if (!settings_.devices) return apply(CellEvent::done);
       if (start_step_ == StartStep::devices && devices_ready()) {
-        if (const auto no = refuse_scanner()) return abort(*no);
+        if (const auto no = refuse_scanner()) return abort(*no, HoldCause::measurement);
         start_step_ = StartStep::calibrating;
         if (!calibrated_) robot_.calibrate(now_);
       }
@@ -248,8 +283,8 @@ void Cell::advance_state() {
       // The arm may calibrate as long as it likes; whoever else is not there makes the time run.
       if (devices_ready() || (scanner_ready() && robot_.state() == hal::RobotState::moving)) entered_ = now_;
       if (now_ - entered_ > settings_.device_timeout) {
-        abort(scanner_ready() ? hal::Message::format("robot: {}", robot_.why())
-                              : hal::Message::format("scanner: {}", scanner_.why()));
+        abort(scanner_ready() ? why_not_ready("robot", robot_.why())
+                              : why_not_ready("scanner", scanner_.why()));
       }
       return;
     case CellState::execute:
@@ -262,7 +297,12 @@ void Cell::advance_state() {
       return;
     case CellState::held:
       // Looked at, not waited for: the scanner may have come back while the arm still ended its motion.
-      if (cause_ == HoldCause::scanner && scanner_ready()) apply(CellEvent::unhold);
+      if (cause_ == HoldCause::scanner && scanner_ready()) return apply(CellEvent::unhold);
+      if (cause_ == HoldCause::scanner && now_ - entered_ > settings_.scanner_wait) {
+        hold(HoldCause::person,
+             hal::Message::format("no scanner for {} s ({:.80}): bring it back, then go on",
+                                  settings_.scanner_wait / 1s, scanner_.why()));
+      }
       if (cause_ == HoldCause::recorder && recorder_.room_for_frame() && !recorder_.store_failed())
         apply(CellEvent::unhold);
       return;
@@ -300,6 +340,11 @@ std::optional<hal::Message> Cell::refuse_scanner() const {
   constexpr double tolerance = 0.01;
   const auto& info = scanner_.info();
   const double x = 2 * settings_.tracker.field_half_x_mm, y = 2 * settings_.tracker.field_half_y_mm;
+  if (info.depth_mm < (1 - tolerance) * settings_.depth_mm) {
+    return hal::Message::format(
+        "scanner measures {:.1f} mm to each side in height: correct [scanner] depth_mm = {:.1f}",
+        info.depth_mm, settings_.depth_mm);
+  }
   if (std::abs(info.field_x_mm - x) <= tolerance * x && std::abs(info.field_y_mm - y) <= tolerance * y)
     return std::nullopt;
   return hal::Message::format(
@@ -342,6 +387,14 @@ void Cell::publish() {
   } else if (phase_ == Phase::finish_fit) {
     p.part_done = surface_.progress();
     p.time_left = Duration{0};
+  }
+  // Nothing is wrong yet, and the cell waits: for whom, and what that one says.
+  const bool waits =
+      state_ == CellState::starting || state_ == CellState::unholding || state_ == CellState::clearing;
+  if (waits && settings_.devices && p.why.empty() && !devices_ready()) {
+    p.why = !scanner_ready()                            ? why_not_ready("scanner", scanner_.why())
+            : robot_.state() == hal::RobotState::moving ? hal::Message{"the arm calibrates"}
+                                                        : why_not_ready("robot", robot_.why());
   }
   published_.set(p);
 }

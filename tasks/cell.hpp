@@ -47,8 +47,10 @@ struct CellSettings {
   double lowest_plate_z_mm = -1e9;  // what lies lower is the table
   int max_attempts = 3;             // of one shot, before the cell holds
   Duration device_timeout = 10s;    // for scanner and robot to become ready at the start
-  std::uint32_t epoch = 1;          // of this run's shot ids (shot_archive.hpp)
-  bool devices = true;              // false: only archived shots, nothing moves
+  Duration scanner_wait = Duration::max();  // for one that is lost; then a person is waited for
+  Arrival arrival;
+  std::uint32_t epoch = 1;  // of this run's shot ids (shot_archive.hpp)
+  bool devices = true;      // false: only archived shots, nothing moves
 };
 
 enum class HoldCause : std::uint8_t {
@@ -133,6 +135,7 @@ class Cell final : public Task {
   void advance_state() MOLDLOFT_NONBLOCKING;
   void start_devices() MOLDLOFT_NONBLOCKING;
   std::optional<hal::Message> refuse_scanner() const MOLDLOFT_NONBLOCKING;
+  void on_arrival(const hal::Pose& reported) MOLDLOFT_NONBLOCKING;
   bool scanner_ready() const MOLDLOFT_NONBLOCKING;
   bool devices_ready() const MOLDLOFT_NONBLOCKING;
   void account() MOLDLOFT_NONBLOCKING;
@@ -187,7 +190,7 @@ class Cell final : public Task {
   hal::Message why_;
   StartStep start_step_ = StartStep::devices;
   bool begun_ = false, devices_started_ = false, calibrated_ = false;
-  bool counting_ = false, has_driven_ = false;
+  bool counting_ = false, has_driven_ = false, arrival_doubted_ = false;
   bool frame_decided_ = false;  // the target that the robot's driver has not written yet
 
   ShotState shot_state_ = ShotState::parked;
@@ -196,7 +199,7 @@ class Cell final : public Task {
   bool looking_ = false;   // the background work has a frame, the last or the one that arrives
   bool accepted_ = false;  // it is whole
   hal::Pose standing_;
-  std::uint32_t last_number_ = 0, epoch_ = 0;
+  std::uint32_t last_number_ = 0, epoch_ = 0, scanner_session_ = 0;
 
   BoundaryTracker tracker_;
   ShotView view_;
@@ -211,7 +214,6 @@ class Cell final : public Task {
   CycleTimes cycle_;
   Histogram frame_to_command_, data_age_;
   ClockDrift scanner_clock_;
-  std::uint32_t scanner_session_ = 0;
   hal::LatestValue<CellProgress> published_;
 };
 

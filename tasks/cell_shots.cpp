@@ -20,6 +20,15 @@ void Cell::want(const ShotPlace& place, ShotPurpose purpose) {
 
 // Hands the next wanted shot to the arm, and lets the scanner expose when everything is ready for the frame.
 void Cell::sequence() {
+  // Where the arm stands is in doubt, and somebody has looked: the same target once more.
+  if (arrival_doubted_ && robot_.state() == hal::RobotState::ready) {
+    arrival_doubted_ = false;
+    if (const auto no =
+            refuse_target(arm_.commanded, standing_, settings_.speed_percent, settings_.workspace))
+      return abort(*no);
+    if (!robot_.move(arm_.commanded, settings_.speed_percent, now_))
+      return abort("robot takes no target although it said it was ready: check it and clear");
+  }
   if (wanted_ && (shot_state_ == ShotState::parked || shot_state_ == ShotState::computing)) {
     skip_given_up();
     if (deliver_archived()) return;
@@ -91,6 +100,7 @@ void Cell::carry_out(ShotAction action) {
 void Cell::drive() {
   arm_ = *wanted_;
   wanted_.reset();
+  arrival_doubted_ = false;
   arm_.shot_id = (epoch_ << shot_number_bits) | arm_.number;
   if (!pick_pose(arm_)) return;
   if (!robot_.move(arm_.commanded, settings_.speed_percent, now_)) {

@@ -10,7 +10,9 @@ void ClockDrift::add(hal::Instant ours, std::uint64_t theirs_ns) noexcept {
   const std::int64_t t_ns = (ours - first_ours_).count();
   // Unsigned: the difference is right across a wrap of theirs.
   const auto theirs = static_cast<std::int64_t>(theirs_ns - first_theirs_);
-  const double t = static_cast<double>(t_ns) * 1e-9, d = static_cast<double>(theirs - t_ns) * 1e-3;
+  // Each for itself: their difference is beyond 64 bits where a sensor's clock makes no sense.
+  const double t = static_cast<double>(t_ns) * 1e-9,
+               d = (static_cast<double>(theirs) - static_cast<double>(t_ns)) * 1e-3;
   sum_t_ += t, sum_d_ += d;
   sum_tt_ += t * t, sum_td_ += t * d, sum_dd_ += d * d;
 }

@@ -1,6 +1,10 @@
 #include "tasks/motion_guard.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
+
+#include "tasks/tool_pose.hpp"
 
 namespace moldloft::tasks {
 namespace {
@@ -30,6 +34,20 @@ std::optional<hal::Message> refuse_target(const hal::Pose& target, const hal::Po
                                 workspace.max_speed_percent);
   }
   return std::nullopt;
+}
+
+std::optional<hal::Message> refuse_arrival(const hal::Pose& reported, const hal::Pose& commanded,
+                                           const Arrival& limits) {
+  const geometry::RigidMotion is = motion_of(reported), was_meant = motion_of(commanded);
+  const double distance = (is.translation() - was_meant.translation()).norm();
+  // Of two rotations that differ by the angle a, the matrices differ by 2 sqrt(2) sin(a / 2) in the Frobenius norm.
+  const double sine = (is.linear() - was_meant.linear()).norm() / (2 * std::numbers::sqrt2);
+  const double turn = 2 * std::asin(std::min(1.0, sine));
+  if (distance <= limits.distance_mm && turn <= limits.turn_rad) return std::nullopt;
+  return hal::Message::format(
+      "the robot says it has arrived {:.1f} mm and {:.1f} degrees off its target ([robot] arrival_mm, "
+      "arrival_deg: {:.3g}, {:.3g}): look where the arm stands",
+      distance, turn / hal::degree, limits.distance_mm, limits.turn_rad / hal::degree);
 }
 
 }  // namespace moldloft::tasks

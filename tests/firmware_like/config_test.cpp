@@ -50,6 +50,8 @@ std::string values(const CellConfig& c) {
   const auto& w = c.robot.workspace;
   return fmt::format("{} {} {} {} ", c.name, c.tick.count(), static_cast<int>(c.missed_ticks),
                      c.device_timeout.count()) +
+         fmt::format("{} {} {:.9f} ", c.scanner_wait.count(), c.robot.arrival.distance_mm,
+                     c.robot.arrival.turn_rad) +
          fmt::format("{} {} {} {} {} {} {} {} {} {} {} ", s.driver, s.host, s.port,
                      static_cast<int>(s.encoding), s.max_stripes, s.max_points_per_stripe, s.field_x_mm,
                      s.field_y_mm, s.noise_mm, s.depth_mm, mount) +
@@ -80,6 +82,9 @@ std::string changed(const std::string& line) {
                                                                          {"tick_us", "2000"},
                                                                          {"missed_ticks", "\"stop\""},
                                                                          {"device_timeout_s", "2.5"},
+                                                                         {"scanner_wait_s", "60"},
+                                                                         {"arrival_mm", "1"},
+                                                                         {"arrival_deg", "0.5"},
                                                                          {"host", "\"10.0.0.7\""},
                                                                          {"port", "4015"},
                                                                          {"encoding", "\"float32\""},
@@ -155,7 +160,7 @@ TEST_CASE("every key of the example is read: another value makes another configu
     other.erase(other.begin() + static_cast<std::ptrdiff_t>(i));
     CHECK(values(parsed(joined(other))) == before);
   }
-  CHECK(keys == 45);
+  CHECK(keys == 48);
   CHECK(fixed == 3);
 }
 
@@ -172,8 +177,8 @@ TEST_CASE("the mount is Rz Ry Rz and then the translation") {
 
 TEST_CASE("what is wrong is told in one line with file, line, key and what is allowed") {
   CHECK(refusal("[robot]\n\nbauds = 9600\n") ==
-        "cell.toml:3: [robot] bauds: unknown key; known here: baud, device, driver, repeatability_z_mm, "
-        "speed_percent, workspace");
+        "cell.toml:3: [robot] bauds: unknown key; known here: arrival_deg, arrival_mm, baud, device, driver, "
+        "repeatability_z_mm, speed_percent, workspace");
   CHECK(refusal("\nrobots = 1\n") ==
         "cell.toml:2: robots: unknown key; known here: cell, fit, plate, realtime, robot, scan, scanner, "
         "schema, "
@@ -230,6 +235,20 @@ TEST_CASE("a file that is not TOML is refused with its line, in one line") {
     CHECK(why.find('\n') == std::string::npos);
   }
   CHECK(refusal("schema = 1\n[cell\n").starts_with("cell.toml:2: "));
+}
+
+TEST_CASE("a text that cannot be shown on one line, or is too long for a path, is refused by its key") {
+  CHECK(refusal("[scanner]\nhost = \"a\\nb\"\n") ==
+        "cell.toml:2: [scanner] host: holds a control character: write it without");
+  CHECK(refusal("[robot]\ndevice = \"/dev/tty\\u0000\"\n") ==
+        "cell.toml:2: [robot] device: holds a control character: write it without");
+  CHECK(refusal("[robot]\ndevice = \"" + std::string(5000, 'x') + "\"\n") ==
+        "cell.toml:2: [robot] device: 5000 bytes long; 4095 at most");
+  CHECK(refusal("\"a\\u001b[2J\" = 1\n").starts_with("cell.toml:1: a?[2J: unknown key; known here: "));
+  // A name is for people alone, and runs of earlier versions may have any: it is made fit to be shown.
+  CHECK(parsed("[cell]\nname = \"a\\nb\\u0000\"\n").name == "a b?");
+  CHECK(parsed("[cell]\nname = \"" + std::string(5000, 'x') + "\"\n").name == std::string(197, 'x') + "...");
+  CHECK(parsed("[cell]\nname = \"Blech Ä 12 <b> 側板\"\n").name == "Blech Ä 12 <b> 側板");
 }
 
 TEST_CASE("a configuration is loaded with its path and its text, which the run keeps") {

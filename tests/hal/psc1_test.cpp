@@ -324,7 +324,8 @@ TEST_CASE("a frame payload that contradicts itself is refused whole") {
   CHECK(flaw_with(10, std::uint8_t{2}) == Flaw::content);  // encoding
   CHECK(flaw_with(16, std::nanf("")) == Flaw::content);    // scale of x
   CHECK(flaw_with(16, 0.0f) == Flaw::content);
-  CHECK(flaw_with(28, INFINITY) == Flaw::content);                   // offset of x
+  CHECK(flaw_with(16, 1e36f) == Flaw::content);     // its largest steps would lie at infinity
+  CHECK(flaw_with(28, INFINITY) == Flaw::content);  // offset of x
   CHECK(flaw_with(48 + 12 + 4, std::uint32_t{6}) == Flaw::content);  // stripe 1 begins inside stripe 0
   CHECK(flaw_with(48 + 24 + 8, std::uint32_t{8}) == Flaw::content);  // stripe 2 ends beyond the points
   CHECK(flaw_with(48 + 24 + 8, std::uint32_t{0xFFFFFFFF}) == Flaw::content);

@@ -451,30 +451,6 @@ TEST_CASE("a shot id that an earlier run has used does not bring that run's pict
   CHECK(event->kind == Kind::shot_failed);
 }
 
-TEST_CASE("a scanner that cannot serve says why, and is asked again") {
-  Cell cell{{.max_points = 499}};
-  cell.scanner.start(0ms);
-  cell.run(50ms);
-  CHECK(cell.scanner.state() == ScannerState::offline);
-  CHECK(cell.scanner.why() ==
-        "the scanner's frames (10 stripes, 500 points) exceed the limits (200, 499): raise them");
-
-  Cell refuses;
-  refuses.peer.config_status = psc1::Status::unsupported;
-  refuses.scanner.start(0ms);
-  refuses.run(3s);
-  CHECK(refuses.scanner.why() == "the scanner refuses the configuration (status 3)");
-  CHECK(refuses.events.empty());
-  refuses.peer.config_status = psc1::Status::ok;
-  CHECK(refuses.run_until(Kind::ready, 3s));
-
-  Cell other;
-  other.peer.hello_status = psc1::Status::unsupported;
-  other.scanner.start(0ms);
-  other.run(50ms);
-  CHECK(other.scanner.why() == "the scanner does not speak version 1 of PSC1");
-}
-
 TEST_CASE(
     "an error of the sensor costs an attempt, a sensor that forgot its configuration is greeted again") {
   Cell cell;

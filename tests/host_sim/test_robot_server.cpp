@@ -283,3 +283,71 @@ TEST_CASE("the emergency stop latches until it is released and SYN has come") {
   bench.move(1, 500, 0);
   CHECK(bench.next()->verb == Verb::ack);
 }
+
+TEST_CASE("in manual mode STA says so and numbered lines are errors, a motion that the key interrupts too") {
+  Bench bench;
+  bench.make_ready();
+  bench.move(2, -300, 600, 3);
+  CHECK(bench.next()->verb == Verb::ack);
+  bench.robot.turn_key(true, bench.clock.now());
+  const auto ended = bench.next();
+  CHECK(ended->number == 2);
+  CHECK(ended->code == std::to_underlying(robot_line::Error::manual));
+  bench.ask(Verb::sta);
+  CHECK(bench.next()->status.mode == robot_line::Status::Mode::manual);
+  bench.move(3, 500, 0);
+  CHECK(bench.next()->code == std::to_underlying(robot_line::Error::manual));
+  bench.calibrate(4);
+  CHECK(bench.next()->code == std::to_underlying(robot_line::Error::manual));
+  CHECK(bench.robot.counters().motions == 1);
+  bench.robot.turn_key(false, bench.clock.now());
+  bench.ask(Verb::sta);
+  CHECK(bench.next()->status.mode == robot_line::Status::Mode::calibrated);
+  bench.move(5, 500, 0);
+  CHECK(bench.next()->verb == Verb::ack);
+}
+
+TEST_CASE("STP ends a calibration too, and is answered before the error of what it ends") {
+  Bench bench;
+  bench.ask(Verb::syn, 5);
+  bench.next();
+  bench.calibrate(1);
+  CHECK(bench.next()->verb == Verb::ack);
+  bench.ask(Verb::stp);
+  CHECK(bench.next()->answers == Verb::stp);
+  CHECK(bench.next()->code == std::to_underlying(robot_line::Error::stopped));
+  bench.ask(Verb::sta);
+  CHECK(bench.next()->status.mode == robot_line::Status::Mode::automatic);
+}
+
+TEST_CASE("a line of a form that does not exist is NAK CK, whatever its checksum") {
+  Bench bench;
+  bench.make_ready();
+  for (const std::string text :
+       {"0000 MOV 500.000 0.000 330.000 0.000 180.000 180.000 50", "0005 PNG",
+        "0002 MOV 500.000 0.000 330.000", "0002 MOV 500.000 0.000 330.000 0.000 180.000 180.000 0",
+        "0002 CAL 1", "0000 SYN 16777216", "0000 SYN"}) {
+    CAPTURE(text);
+    bench.send_text(">" + text + " *" + std::to_string(robot_line::fletcher16(text)) + "\n");
+    const auto reply = bench.next();
+    CHECK(reply->verb == Verb::nak);
+    CHECK(reply->number == 0);
+    CHECK(reply->refusal == Refusal::checksum);
+  }
+  CHECK(bench.robot.counters().motions == 0);
+}
+
+TEST_CASE("the watchdog is armed by SYN, and a line that is refused feeds it all the same") {
+  Bench bench;
+  CHECK_FALSE(bench.next(5s, false).has_value());
+  CHECK(bench.robot.counters().watchdogs == 0);
+  bench.ask(Verb::syn, 5);
+  bench.next();
+  for (int k = 0; k < 5; ++k) {
+    bench.move(77, 500, 0);
+    CHECK(bench.next(1s, false)->refusal == Refusal::sequence);
+    CHECK_FALSE(bench.next(2s, false).has_value());
+  }
+  CHECK(bench.robot.counters().watchdogs == 0);
+  CHECK(bench.next(4s, false)->code == std::to_underlying(robot_line::Event::watchdog));
+}

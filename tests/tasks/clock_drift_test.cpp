@@ -54,3 +54,17 @@ TEST_CASE("two readings, or readings of one moment, are no estimate") {
   for (int i = 0; i < 5; ++i) drift.add(1s, 1);
   CHECK_FALSE(drift.estimate());
 }
+
+TEST_CASE("a sensor's clock that goes back, stands or jumps anywhere spoils the estimate and nothing else") {
+  std::mt19937_64 random{3};
+  for (int trial = 0; trial < 100; ++trial) {
+    ClockDrift drift;
+    for (int second = 0; second < 10; ++second) drift.add(Instant{std::chrono::hours{second}}, random());
+    CHECK(drift.estimate().has_value());  // under the sanitizer: no overflow
+  }
+  ClockDrift back;
+  for (int second = 0; second < 10; ++second)
+    back.add(Instant{std::chrono::seconds{second}},
+             1'000'000'000'000u - static_cast<std::uint64_t>(second) * 1'000'000'000);
+  CHECK(back.estimate()->ppm == doctest::Approx(-2e6));
+}

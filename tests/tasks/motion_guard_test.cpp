@@ -45,3 +45,30 @@ TEST_CASE("a target that is not a number is refused before any comparison with i
   CHECK(refusal({.x_mm = NAN, .z_mm = 300}).find("not finite") != std::string::npos);
   CHECK(refusal({.x_mm = 500, .z_mm = 300, .roll = INFINITY}).find("not finite") != std::string::npos);
 }
+
+TEST_CASE(
+    "an arrival is believed within the limits, in whatever angles it is said, and named when it is not") {
+  const Arrival limits{.distance_mm = 5, .turn_rad = 2 * hal::degree};
+  const hal::Pose target{
+      .x_mm = 400, .y_mm = -80, .z_mm = 155, .pitch = 180 * hal::degree, .roll = 35 * hal::degree};
+  const auto refused = [&](const hal::Pose& reported) {
+    const auto no = refuse_arrival(reported, target, limits);
+    return no ? std::string{no->view()} : "";
+  };
+  CHECK(refused(target) == "");
+  CHECK(refused({.x_mm = 403, .y_mm = -76, .z_mm = 155, .pitch = target.pitch, .roll = target.roll}) ==
+        "");  // 5 mm
+  CHECK(refused({.x_mm = 403.01, .y_mm = -76, .z_mm = 155, .pitch = target.pitch, .roll = target.roll}) ==
+        "the robot says it has arrived 5.0 mm and 0.0 degrees off its target ([robot] arrival_mm, "
+        "arrival_deg: 5, 2): "
+        "look where the arm stands");
+  hal::Pose other = target;
+  other.yaw = 325 * hal::degree, other.roll = 360 * hal::degree;  // straight down only yaw - roll counts
+  CHECK(refused(other) == "");
+  other.roll = 362.1 * hal::degree;
+  CHECK(refused(other).find("0.0 mm and 2.1 degrees") != std::string::npos);
+  other = target, other.pitch = 0;
+  CHECK(refused(other).find("and 180.0 degrees") != std::string::npos);
+  other = target, other.x_mm = 999'999.999;
+  CHECK(refused(other).find("999600.0 mm and 0.0") != std::string::npos);
+}
