@@ -96,7 +96,8 @@ void read_rest(TomlSection& file, CellConfig& c) {
   TomlSection cell = file.section("cell");
   cell.label("name", c.name);
   int tick_us = static_cast<int>(c.tick.count() / 1000);
-  cell.integer("tick_us", tick_us, static_cast<int>(shortest_tick.count() / 1000), 100000);
+  cell.integer("tick_us", tick_us, static_cast<int>(shortest_tick.count() / 1000),
+               static_cast<int>(longest_tick.count() / 1000));
   c.tick = std::chrono::microseconds{tick_us};
   std::string missed{"skip"};
   cell.choice("missed_ticks", missed, {"skip", "catch_up_once", "reanchor", "stop"});

@@ -1,9 +1,16 @@
 #include "firmware_like/display.hpp"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstdlib>
+#include <string_view>
+
 #include "firmware_like/console.hpp"
+#include "firmware_like/journal.hpp"
+#include "firmware_like/option_values.hpp"
 #include "firmware_like/stop_signals.hpp"
 
 namespace moldloft::firmware_like {
@@ -14,38 +21,25 @@ constexpr auto display_period = 100ms;
 
 }  // namespace
 
-std::string progress_line(const tasks::CellProgress& p) {
-  std::string state{tasks::to_string(p.state)};
-  if (p.phase != tasks::Phase::none) state += fmt::format(" / {}", tasks::to_string(p.phase));
-  std::string line = fmt::format("{:7.1f} s  {:<24}", std::chrono::duration<double>(p.now).count(), state);
-  line += fmt::format("  boundary shots {:>3}", p.boundary_shots);
-  if (p.surface_planned > 0) line += fmt::format("  surface {:>3}/{}", p.surface_shots, p.surface_planned);
-  if (p.retaken > 0) line += fmt::format("  retaken {}", p.retaken);
-  if (p.time_left >= hal::Duration{0})
-    line += fmt::format("  left {:.0f} s", std::chrono::duration<double>(p.time_left).count());
-  // What ends the run is said once, by its last line; what only holds it up is said here.
-  const bool goes_on_by_itself =
-      p.cause == tasks::HoldCause::scanner || p.cause == tasks::HoldCause::recorder;
-  if (!p.why.empty() && goes_on_by_itself) line += fmt::format("  {}", p.why.view());
-  return line;
+bool renews_lines(int file, const char* term) {
+  const std::string_view kind = term == nullptr ? "" : term;
+  return ::isatty(file) != 0 && !kind.empty() && kind != "dumb";
 }
 
-std::string status_line(const tasks::CellProgress& p) {
-  std::string line{tasks::to_string(p.state)};
-  if (p.phase != tasks::Phase::none) line += fmt::format(" / {}", tasks::to_string(p.phase));
-  if (p.boundary_shots > 0) line += fmt::format(", {} boundary shots", p.boundary_shots);
-  if (p.surface_planned > 0)
-    line += fmt::format(", {} of {} surface shots", p.surface_shots, p.surface_planned);
-  // After a stop the reason of a hold before it is history.
-  if (!p.why.empty() && p.state != tasks::CellState::stopping && p.state != tasks::CellState::stopped)
-    line += fmt::format(": {}", p.why.view());
-  return line;
+std::size_t terminal_columns(int file, const char* columns) {
+  winsize size{};
+  if (::ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) return size.ws_col;
+  const Limits<std::size_t> sensible{1, 10'000};
+  std::size_t told = 0;
+  return columns != nullptr && read_number(columns, sensible, told) ? told : 80;
 }
 
-DisplayThread::DisplayThread(const tasks::Cell& cell, std::string head)
-    : cell_{cell}, terminal_{isatty(STDERR_FILENO) != 0}, head_{std::move(head)}, thread_{[this] {
-        work();
-      }} {}
+DisplayThread::DisplayThread(const tasks::Cell& cell, std::string head, Surroundings around)
+    : cell_{cell},
+      terminal_{renews_lines(STDERR_FILENO, std::getenv("TERM"))},
+      head_{std::move(head)},
+      around_{std::move(around)},
+      thread_{[this] { work(); }} {}
 
 DisplayThread::~DisplayThread() {
   ending_ = true;
@@ -71,17 +65,19 @@ void DisplayThread::show(const tasks::CellProgress& p) {
     say(fmt::format("{}moldloft: ctrl-Z does nothing while the arm may move; ctrl-C stops and saves\n",
                     terminal_ ? "\r\x1b[K" : ""));
   }
-  const std::string line = progress_line(p);
   if (terminal_) {
-    say("\r\x1b[K" + line);
+    // The last column stays free: a line that fills it would wrap on some terminals. Asked each time, since windows are
+    // resized.
+    const auto columns = terminal_columns(STDERR_FILENO, std::getenv("COLUMNS"));
+    say(fmt::format("\r\x1b[K{}",
+                    progress_line_within(std::max<std::size_t>(columns, 2) - 1, p, around_)));
     return;
   }
-  // Everything but the clock: a log gets a line when something has happened.
-  std::string content = line.substr(line.find('s') + 1);
-  if (const auto left = content.find("  left"); left != std::string::npos) content.resize(left);
-  if (!begun_ || content == last_) return;
+  // A log gets a line when something has happened, not when time has passed. In the journal nothing has to stand alone.
+  const std::string content = fmt::format("{}, {} retaken", status_line(p, around_), p.retaken);
+  if ((!begun_ && !stderr_is_journal()) || content == last_) return;
   last_ = content;
-  say(line + "\n");
+  say(progress_line(p, around_) + "\n");
 }
 
 }  // namespace moldloft::firmware_like

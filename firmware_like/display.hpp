@@ -1,25 +1,29 @@
-// Progress for a person: one line that renews itself on a terminal, one line a change where the output is a
-// file. progress_line() is pure; DisplayThread is the ordinary thread that prints it. A run that ends before
-// it has begun to measure leaves nothing behind here: the one line that says why stands alone.
+// Progress for a person: one line that renews itself on a terminal and fits into it, one line a change where the
+// output is a file or a terminal that cannot renew a line (TERM=dumb). The ordinary thread that prints
+// progress_text.hpp. A run that ends before it has begun to measure leaves nothing behind here: the one line that says
+// why stands alone.
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <string>
 #include <thread>
 
+#include "firmware_like/progress_text.hpp"
 #include "hal/clock.hpp"
 #include "tasks/cell.hpp"
 
 namespace moldloft::firmware_like {
 
-std::string progress_line(const tasks::CellProgress&);
-// The same without the time that passes, and with what a person has to see to: it changes when something happens.
-std::string status_line(const tasks::CellProgress&);
+// Whether the standard error is a terminal that can renew a line.
+bool renews_lines(int file, const char* term);
+// How many columns a terminal has: as it says now, or as COLUMNS says, or 80.
+std::size_t terminal_columns(int file, const char* columns);
 
 class DisplayThread {
  public:
   // `head` is printed once, when the cell begins to measure or to wait for an operator.
-  DisplayThread(const tasks::Cell&, std::string head);
+  DisplayThread(const tasks::Cell&, std::string head, Surroundings);
   ~DisplayThread();
   DisplayThread(const DisplayThread&) = delete;
   DisplayThread& operator=(const DisplayThread&) = delete;
@@ -31,6 +35,7 @@ class DisplayThread {
   hal::SteadyClock clock_;
   bool terminal_, begun_ = false;
   std::string head_;
+  const Surroundings around_;
   std::string last_;
   std::atomic<bool> ending_{false};
   std::thread thread_;

@@ -11,6 +11,8 @@
 
 namespace moldloft::firmware_like {
 
+inline constexpr double longest_latency_s = 30 * 24 * 3600.0;
+
 struct LatencyOptions {
   double duration_s = 30;  // of the whole measurement; with compare each side gets half of it
   std::string compare;     // "cyclictest", or empty

@@ -11,8 +11,9 @@ namespace {
 using tasks::Histogram;
 using namespace std::chrono_literals;
 
-constexpr double width_px = 920, height_px = 330;
-constexpr double left_px = 64, right_px = 18, top_px = 26, bottom_px = 46;
+constexpr double left_px = 64, right_px = 18, bottom_px = 46;
+constexpr double legend_line_px = 18;
+constexpr double time_label_px = 58, digit_px = 7.2;  // at 12 px
 constexpr double bars_an_octave = 8;
 
 struct Bar {
@@ -58,8 +59,10 @@ void count_into(std::vector<Bar>& bars, std::size_t s, const Histogram& h) {
 }
 
 struct Axes {
+  double width_px, height_px, top_px;
   double from, to;  // log10 of nanoseconds
   double top;       // log10 of counts
+  double decade_px() const { return (width_px - left_px - right_px) / (to - from); }
   double x(double ns) const {
     return left_px + (std::log10(std::max(ns, 1e-3)) - from) / (to - from) * (width_px - left_px - right_px);
   }
@@ -77,14 +80,17 @@ std::string count_text(double count) {
 
 std::string grid(const Axes& axes) {
   std::string svg;
-  const double bottom = height_px - bottom_px;
+  const double bottom = axes.height_px - bottom_px;
+  const bool has_room_between = std::log10(2.0) * axes.decade_px() > time_label_px;
+  const double every = std::ceil(time_label_px / axes.decade_px());  // of the decades a label
   for (double decade = std::floor(axes.from); decade <= axes.to + 1e-9; ++decade) {
     for (int digit = 1; digit < 10; ++digit) {
       const double ns = digit * std::pow(10.0, decade), x = axes.x(ns);
-      if (x < left_px - 0.5 || x > width_px - right_px + 0.5) continue;
-      const bool labelled = digit == 1 || ((digit == 2 || digit == 5) && axes.to - axes.from < 3.5);
+      if (x < left_px - 0.5 || x > axes.width_px - right_px + 0.5) continue;
+      const bool labelled =
+          digit == 1 ? std::fmod(decade, every) == 0 : (digit == 2 || digit == 5) && has_room_between;
       svg += fmt::format(R"(<line class="{}" x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}"/>)",
-                         digit == 1 ? "grid" : "fine", x, top_px, x, bottom);
+                         digit == 1 ? "grid" : "fine", x, axes.top_px, x, bottom);
       if (labelled)
         svg += fmt::format(R"(<text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>)", x,
                            bottom + 16, time_text(hal::Duration{std::llround(ns)}));
@@ -93,7 +99,7 @@ std::string grid(const Axes& axes) {
   for (double decade = 0; decade <= axes.top + 1e-9; ++decade) {
     const double y = axes.y(std::pow(10.0, decade));
     svg += fmt::format(R"(<line class="grid" x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}"/>)", left_px, y,
-                       width_px - right_px, y);
+                       axes.width_px - right_px, y);
     svg += fmt::format(R"(<text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="end">{}</text>)", left_px - 8,
                        y + 4, count_text(std::pow(10.0, decade)));
   }
@@ -111,13 +117,22 @@ std::string outline(const std::vector<Bar>& bars, std::size_t s, const Axes& axe
   return fmt::format(R"(<path class="s{}" d="{}V{:.1f}Z"/>)", s, path, bottom);
 }
 
-std::string legend(const std::vector<LogSeries>& series) {
+// Names beside their colours, in as many lines as they need; how many that are is left in `lines`.
+std::string legend(const std::vector<LogSeries>& series, double width_px, int& lines) {
   std::string svg;
   double x = left_px + 4;
-  for (std::size_t s = 0; s < series.size(); ++s) {
-    svg += fmt::format(R"(<rect class="s{}" x="{:.1f}" y="6" width="18" height="10"/>)", s, x);
-    svg += fmt::format(R"(<text class="tick" x="{:.1f}" y="15">{}</text>)", x + 24, series[s].name);
-    x += 24 + 7.2 * static_cast<double>(series[s].name.size()) + 28;
+  lines = series.size() > 1 ? 1 : 0;
+  for (std::size_t s = 0; s < series.size() && series.size() > 1; ++s) {
+    const double length = 24 + digit_px * static_cast<double>(series[s].name.size());
+    if (s > 0 && x + length > width_px) {
+      ++lines;
+      x = left_px + 4;
+    }
+    const double y = 6 + (lines - 1) * legend_line_px;
+    svg += fmt::format(R"(<rect class="s{}" x="{:.1f}" y="{:.1f}" width="18" height="10"/>)", s, x, y);
+    svg +=
+        fmt::format(R"(<text class="tick" x="{:.1f}" y="{:.1f}">{}</text>)", x + 24, y + 9, series[s].name);
+    x += length + 28;
   }
   return svg;
 }
@@ -145,21 +160,28 @@ std::string log_plot(const LogPlot& plot) {
   double most = 1;
   for (const auto& bar : bars)
     for (const auto count : bar.counts) most = std::max(most, static_cast<double>(count));
-  Axes axes{.from = 3, .to = 6, .top = std::log10(most) + 0.08};
+  int legend_lines = 0;
+  const std::string names = legend(plot.series, plot.width_px, legend_lines);
+  Axes axes{.width_px = plot.width_px,
+            .height_px = plot.height_px,
+            .top_px = 8 + std::max(1, legend_lines) * legend_line_px,
+            .from = 3,
+            .to = 6,
+            .top = std::log10(most) + 0.08};
   if (!bars.empty()) {
     axes.from = std::log10(bars.front().from_ns) - 0.02;
     axes.to = std::max(std::log10(bars.back().to_ns) + 0.02, axes.from + 1);
   }
-  std::string svg =
-      fmt::format(R"(<svg viewBox="0 0 {} {}" role="img" aria-label="{}">)", width_px, height_px, plot.label);
+  std::string svg = fmt::format(R"(<svg viewBox="0 0 {} {}" role="img" aria-label="{}">)", plot.width_px,
+                                plot.height_px, plot.label);
   svg += grid(axes);
   for (std::size_t s = 0; s < plot.series.size() && !bars.empty(); ++s) svg += outline(bars, s, axes);
-  if (plot.series.size() > 1) svg += legend(plot.series);
+  svg += names;
   svg += fmt::format(R"(<text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>)",
-                     (left_px + width_px - right_px) / 2, height_px - 8, plot.label);
+                     (left_px + plot.width_px - right_px) / 2, plot.height_px - 8, plot.label);
   svg += fmt::format(
       R"svg(<text class="tick" x="14" y="{0:.1f}" text-anchor="middle" transform="rotate(-90 14 {0:.1f})">)svg",
-      height_px / 2);
+      plot.height_px / 2);
   return svg + "how often</text></svg>\n";
 }
 

@@ -27,6 +27,7 @@ struct LogPlot {
   std::string label;            // of the axis of time
   hal::Duration smallest{100};  // what is smaller stands in the first bar
   bool whole_us = false;  // bars begin and end at whole microseconds: for series that know nothing finer
+  double width_px = 920, height_px = 330;  // labels are 12 px and as many as fit
 };
 std::string log_plot(const LogPlot&);
 

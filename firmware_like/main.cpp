@@ -13,11 +13,14 @@
 #include "firmware_like/latency_command.hpp"
 #include "firmware_like/machines.hpp"
 #include "firmware_like/operator_channel.hpp"
+#include "firmware_like/option_values.hpp"
 #include "firmware_like/replay_command.hpp"
 #include "firmware_like/report_command.hpp"
 #include "firmware_like/run_command.hpp"
+#include "firmware_like/task_table.hpp"
 
 using namespace moldloft::firmware_like;
+using namespace std::chrono_literals;
 
 namespace {
 
@@ -43,6 +46,7 @@ int run_command_line(int argc, char** argv) {
   run_command->add_option("--control", run.control,
                           "socket for `moldloft tell`; with it a person is waited for");
   run_command->add_option("--go-on", run.go_on, "of what starts this program: the command to advise");
+  run_command->add_flag("--quiet", run.quiet, "no progress: only errors and the last line");
 
   CheckOptions check;
   auto* check_command = app.add_subcommand("check", "all that can be known before a plate is measured");
@@ -51,9 +55,9 @@ int run_command_line(int argc, char** argv) {
 
   TellOptions tell;
   auto* tell_command = app.add_subcommand("tell", "command a running cell, or ask for its status");
-  tell_command->add_option("command", tell.word, "unhold, hold, stop, abort, clear, status")->required();
-  tell_command->add_option("--control", tell.control, "the socket of the running cell")
-      ->capture_default_str();
+  tell_command->add_option("command", tell.word, operator_words())->required();
+  tell_command->add_option("--control", tell.control,
+                           "the socket of the running cell; default: of the only one that runs");
 
   FitOptions fit;
   auto* fit_command =
@@ -74,21 +78,21 @@ int run_command_line(int argc, char** argv) {
   replay_command->add_option("run", replay.run, "the run's folder, or one dump of the flight recorder")
       ->required();
   replay_command->add_flag("--timeline", replay.timeline, "the flight recorder's dumps, tick by tick");
-  replay_command->add_option("--ticks", replay.ticks, "how many before the trigger")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 1'000'000));
+  add_number_with_default(*replay_command, "--ticks", replay.ticks, {1, 1'000'000},
+                          "how many before the trigger");
   replay_command->add_flag("--all", replay.all_ticks, "all ticks that a dump holds");
 
   LatencyOptions latency;
   auto* latency_command = app.add_subcommand("latency", "timing self-test with fit and recorder busy");
-  latency_command->add_option("--duration", latency.duration_s, "of the whole measurement, s")
-      ->capture_default_str();
+  add_number_with_default(*latency_command, "--duration", latency.duration_s, {1.0, longest_latency_s, "s"},
+                          "of the whole measurement, s");
   latency_command->add_option("--compare", latency.compare, "cyclictest: run it in turns with ours");
   latency_command->add_flag("--json", latency.json, "print the figures as JSON, and nothing else");
   latency_command->add_option("--out", latency.out,
                               "folder for the run store and the report; default: none is kept");
-  latency_command->add_option("--tick", latency.tick_us,
-                              "of the scheduler, us; default: the configuration's");
+  add_number(*latency_command, "--tick", latency.tick_us,
+             {static_cast<int>(shortest_tick / 1us), static_cast<int>(longest_tick / 1us), "us"},
+             "of the scheduler, us; default: the configuration's");
   latency_command->add_option("--config", latency.config,
                               "a cell's configuration (TOML), for [realtime] and scanner");
 

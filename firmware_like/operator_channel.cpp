@@ -8,6 +8,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "firmware_like/console.hpp"
+#include "firmware_like/progress_text.hpp"
 #include "firmware_like/run_command.hpp"
 #include "hal/printable_text.hpp"
 
@@ -44,6 +46,8 @@ std::optional<CellEvent> command_named(std::string_view word) {
   return std::nullopt;
 }
 
+bool makes_safer(CellEvent event) { return event == CellEvent::stop || event == CellEvent::abort; }
+
 bool means_something(tasks::CellState state, CellEvent event) {
   return find_transition(tasks::cell_transitions(), state, event, tasks::CellContext{}) != nullptr;
 }
@@ -58,11 +62,12 @@ std::optional<sockaddr_un> address_of(const std::string& path) {
 
 const sockaddr* generic(const sockaddr_un& address) { return reinterpret_cast<const sockaddr*>(&address); }
 
-bool is_listened_to(const sockaddr_un& address) {
+// A sender that waits for its answer is connected to us, and refuses others in another way than by not being there.
+bool has_gone(const sockaddr_un& sender, socklen_t size) {
   const int file = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  const bool connected = ::connect(file, generic(address), sizeof address) == 0;
+  const bool gone = ::connect(file, generic(sender), size) != 0 && errno == ECONNREFUSED;
   ::close(file);
-  return connected;
+  return gone;
 }
 
 bool waits_no_longer_than(hal::Duration limit, int file) {
@@ -81,30 +86,30 @@ std::string without_line_end(std::string_view text) {
 std::string status_json(const tasks::CellProgress& p) {
   constexpr std::array<const char*, 6> causes = {"none",   "scanner", "recorder",
                                                  "person", "plan",    "measurement"};
-  return json_text(Json{{"state", std::string{tasks::to_string(p.state)}},
-                        {"phase", std::string{tasks::to_string(p.phase)}},
-                        {"hold_cause", causes[static_cast<std::size_t>(p.cause)]},
-                        {"why", std::string{p.why.view()}},
-                        {"boundary_shots", p.boundary_shots},
-                        {"surface_shots", p.surface_shots},
-                        {"surface_planned", p.surface_planned},
-                        {"retaken", p.retaken},
-                        {"seconds", std::chrono::duration<double>(p.now).count()}});
+  return json_text(Json{
+      {"state", std::string{tasks::to_string(p.state)}},
+      {"phase", std::string{tasks::to_string(p.phase)}},
+      {"hold_cause", causes[static_cast<std::size_t>(p.cause)]},
+      {"why", std::string{p.why.view()}},
+      {"boundary_shots", p.boundary_shots},
+      {"surface_shots", p.surface_shots},
+      {"surface_planned", p.surface_planned},
+      {"retaken", p.retaken},
+      {"waiting", awaited_text(p, {.has_operator = true})},
+      {"seconds", std::chrono::duration<double>(p.now).count()},
+      {"seconds_left",
+       p.time_left < 0ns ? Json(nullptr) : Json(std::chrono::duration<double>(p.time_left).count())},
+      {"left_is_estimate", !p.left_is_planned}});
 }
 
 std::string answer_to(std::string_view word, tasks::Cell& cell, const std::function<void()>& let_time_pass) {
   if (word == "status") return status_json(cell.progress());
   const auto event = command_named(word);
-  if (!event) {
-    std::vector<std::string_view> known;
-    for (const auto command : commands) known.push_back(tasks::to_string(command));
-    return fmt::format("refused: unknown command; known: {}, status", fmt::join(known, ", "));
-  }
+  if (!event) return fmt::format("refused: unknown command; known: {}", operator_words());
   const tasks::CellState before = cell.progress().state;
   // What makes the cell safer is passed on in any case: the state may be another by the time that it is taken up.
-  const bool is_safe = *event == CellEvent::stop || *event == CellEvent::abort;
   const bool changes = means_something(before, *event);
-  if (changes || is_safe) cell.command(*event);
+  if (changes || makes_safer(*event)) cell.command(*event);
   if (!changes) return fmt::format("refused: {} means nothing in {}", word, tasks::to_string(before));
   for (int look = 0; look < most_looks; ++look) {
     let_time_pass();
@@ -123,7 +128,7 @@ std::expected<OperatorSocket, std::string> OperatorSocket::open(const std::strin
   if (::stat(path.c_str(), &there) == 0) {
     if (!S_ISSOCK(there.st_mode))
       return std::unexpected{fmt::format("--control {}: is there and no socket", path)};
-    if (is_listened_to(*address))
+    if (try_socket(path) == 0)
       return std::unexpected{fmt::format("--control {}: another moldloft listens there", path)};
     ::unlink(path.c_str());
   }
@@ -155,9 +160,14 @@ void OperatorSocket::serve(hal::Duration wait,
   const ssize_t size = ::recvfrom(file_, word.data(), word.size(), MSG_DONTWAIT,
                                   reinterpret_cast<sockaddr*>(&from), &from_size);
   if (size < 0) return;
-  const std::string line = answer(without_line_end({word.data(), static_cast<std::size_t>(size)})) + "\n";
-  // Who has gone away, or does not read, has no answer.
-  if (from_size > sizeof from.sun_family)
+  const std::string said = without_line_end({word.data(), static_cast<std::size_t>(size)});
+  const bool has_sender = from_size > sizeof from.sun_family;
+  // A program that was stopped for a while must not carry out what nobody stands by any more.
+  const auto event = command_named(said);
+  if (has_sender && has_gone(from, from_size) && !(event && makes_safer(*event))) return;
+  const std::string line = answer(said) + "\n";
+  // A client that left, or does not read, gets no answer.
+  if (has_sender)
     ::sendto(file_, line.data(), line.size(), MSG_DONTWAIT | MSG_NOSIGNAL, generic(from), from_size);
 }
 
@@ -176,6 +186,39 @@ void OperatorThread::work() {
   }
 }
 
+namespace {
+
+std::string why_not_sent(const std::string& path, int why) {
+  const char* advice = why == EACCES   ? "only members of the group that owns the socket may command the cell"
+                       : why == EAGAIN ? "it does not take any more words; does the program stand still?"
+                       : why == ECONNREFUSED ? "nobody listens there any more"
+                                             : "is moldloft running with --control?";
+  return fmt::format("{}: {}; {}", path, std::strerror(why), advice);
+}
+
+// Nobody has taken it up yet, and whoever takes it up later does it all the same.
+bool waits_on(std::string_view word) {
+  const auto event = command_named(word);
+  return event && makes_safer(*event);
+}
+
+std::string plain_word(std::string_view word) {
+  const auto first = word.find_first_not_of(" \t\r\n"), last = word.find_last_not_of(" \t\r\n");
+  if (first == std::string_view::npos) return "";
+  std::string plain{word.substr(first, last - first + 1)};
+  std::ranges::transform(plain, plain.begin(),
+                         [](char c) { return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c; });
+  return plain;
+}
+
+}  // namespace
+
+std::string operator_words() {
+  std::vector<std::string_view> words;
+  for (const auto command : commands) words.push_back(tasks::to_string(command));
+  return fmt::format("{}, status", fmt::join(words, ", "));
+}
+
 std::expected<std::string, std::string> ask_cell(const std::string& word, const std::string& path) {
   const auto address = address_of(path);
   if (!address)
@@ -192,18 +235,24 @@ std::expected<std::string, std::string> ask_cell(const std::string& word, const 
                            ? ::recv(file, answer.data(), answer.size(), MSG_DONTWAIT)
                            : -1;
   ::close(file);
-  if (!sent)
-    return std::unexpected{
-        fmt::format("{}: {}; is moldloft running with --control?", path, std::strerror(why))};
-  if (size < 0) return std::unexpected{fmt::format("{}: no answer within {} s", path, answer_limit / 1s)};
+  if (!sent) return std::unexpected{why_not_sent(path, why)};
+  if (size < 0)
+    return std::unexpected{fmt::format("{}: no answer within {} s; does the program stand still? '{}' {}",
+                                       path, answer_limit / 1s, word,
+                                       waits_on(word) ? "still waits for it" : "is given up")};
   return hal::printable(without_line_end({answer.data(), static_cast<std::size_t>(size)}));
 }
 
 int tell_cell(const TellOptions& options) {
-  const auto answer = ask_cell(options.word, options.control);
-  if (!answer || answer->starts_with("refused:")) {
-    return complain(answer ? *answer : answer.error());
-  }
+  const std::string word = plain_word(options.word);
+  if (word != "status" && !command_named(word))
+    return complain(
+        fmt::format("'{}' is no word that a cell knows; known: {}", options.word, operator_words()));
+  const auto path = options.control.empty() ? running_cell(options.cells)
+                                            : std::expected<std::string, std::string>{options.control};
+  if (!path) return complain(path.error());
+  const auto answer = ask_cell(word, *path);
+  if (!answer || answer->starts_with("refused:")) return complain(answer ? *answer : answer.error());
   show(fmt::format("{}\n", *answer));
   return exit_done;
 }

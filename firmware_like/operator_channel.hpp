@@ -1,5 +1,6 @@
 // The operator's way to a cell that runs without a terminal: a unix datagram socket that takes one word a datagram and
 // answers in one line. Whoever may write to the socket's file may command the cell (its mode is 0660).
+// A word whose sender has gone away before it could be taken up is not carried out, unless it makes the cell safer.
 //
 //   start hold unhold stop abort clear reset      "done: Held -> Starting", or "refused: ..." and why
 //   status                                        one line of JSON
@@ -17,12 +18,14 @@
 #include <string_view>
 #include <thread>
 
+#include "firmware_like/cell_search.hpp"
 #include "hal/clock.hpp"
 #include "tasks/cell.hpp"
 
 namespace moldloft::firmware_like {
 
-inline constexpr const char* default_control_path = "/run/moldloft/control";
+// All words that a cell knows, for people: "start, hold, ..., status".
+std::string operator_words();
 
 // What a word is answered with. `let_time_pass` is called, some ten times at most, while the control loop takes the
 // command up.
@@ -66,7 +69,9 @@ class OperatorThread {
 std::expected<std::string, std::string> ask_cell(const std::string& word, const std::string& path);
 
 struct TellOptions {
-  std::string word, control = default_control_path;
+  std::string word;                  // capitals and blanks around it do not matter to somebody in a hurry
+  std::string control;               // the cell's socket; empty: of the only one that runs
+  std::string cells = cells_folder;  // where that is looked for
 };
 int tell_cell(const TellOptions&);  // `moldloft tell`; the program's exit code
 

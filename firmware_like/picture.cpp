@@ -15,15 +15,16 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double margin_px = 30, head_px = 86;
-constexpr double panel_px = 520, stacked_panel_px = 860, tallest_px = 640;  // a panel's plot fits into these
-constexpr double scale_px = 90;  // beside a plot: the colours and their values
-constexpr double under_px = 44,
-                 legend_px = 24;      // under a plot: the bar of round length; under all: what the lines mean
-constexpr double narrowest_px = 720;  // the legend's line needs this
-// Plates longer than this lie one panel under the other, or they would shrink to ribbons side by side.
-constexpr double stacked_from = 1.8;
-constexpr int colours = 33;  // odd, so that zero has a colour of its own
+// The picture is as wide as a sheet's column, panels one under the other: on a telephone of 400 px its letters are 9 px
+// high, on A4 upright it fills the width.
+constexpr double margin_px = 24;
+constexpr double panel_px = 480, tallest_px = 460;  // a panel's plot fits into these
+constexpr double scale_px = 92;                     // beside a plot: the colours and their values
+constexpr double above_px = 34, under_px = 40;  // over a plot: its title; under it: the bar of round length
+constexpr double width_px = 2 * margin_px + panel_px + scale_px;
+constexpr double letters_px = 15, title_px = 20, line_px = 20;
+constexpr double letter_width = 0.56;  // of a line of sans-serif, in letters' heights
+constexpr int colours = 33;            // odd, so that zero has a colour of its own
 
 struct View {  // from world millimetres to pixels of one panel; y up becomes y down
   Vector2d min, max;
@@ -90,32 +91,44 @@ View view_of(const OverviewInput& in) {
   return view;
 }
 
-// Where the panels stand: side by side, or one under the other.
+// Where the panels stand: one under the other, below the head's lines.
 struct Layout {
   std::size_t panels = 1;
-  bool stacked = false;
-  double plot_width = 0, plot_height = 0;
+  double head = 0, plot_width = 0, plot_height = 0;
 
-  double left(std::size_t i) const {
-    return margin_px + (stacked ? 0.0 : static_cast<double>(i) * (plot_width + scale_px));
-  }
   double top(std::size_t i) const {
-    return head_px + (stacked ? static_cast<double>(i) * (plot_height + under_px + 20) : 0.0);
-  }
-  double width() const {
-    const double columns = stacked ? 1.0 : static_cast<double>(panels);
-    return std::max(2 * margin_px + columns * (plot_width + scale_px) - 20, narrowest_px);
+    return head + above_px + static_cast<double>(i) * (plot_height + above_px + under_px);
   }
   double bottom() const { return top(panels - 1) + plot_height + under_px; }
 };
 
-Layout lay_out(std::size_t panels, View& view) {
+Layout lay_out(std::size_t panels, double head, View& view) {
   const Vector2d size = (view.max - view.min).cwiseMax(1e-9);
-  Layout layout{.panels = panels, .stacked = panels > 1 && size.x() > stacked_from * size.y()};
-  view.scale = std::min((layout.stacked ? stacked_panel_px : panel_px) / size.x(), tallest_px / size.y());
-  layout.plot_width = size.x() * view.scale;
-  layout.plot_height = size.y() * view.scale;
-  return layout;
+  view.scale = std::min(panel_px / size.x(), tallest_px / size.y());
+  return {.panels = panels,
+          .head = head,
+          .plot_width = size.x() * view.scale,
+          .plot_height = size.y() * view.scale};
+}
+
+// A text in lines that fit into the picture, cut between words; a word that is longer than a line is cut in itself.
+std::vector<std::string> lines_of(std::string_view text, double height_px) {
+  const auto columns = static_cast<std::size_t>((width_px - 2 * margin_px) / (letter_width * height_px));
+  const auto continues = [&](std::size_t at) {
+    return (static_cast<unsigned char>(text[at]) & 0xC0u) == 0x80u;
+  };
+  std::vector<std::string> lines;
+  while (text.size() > columns) {
+    std::size_t end = text.rfind(' ', columns);
+    if (end == std::string_view::npos || end == 0) {
+      for (end = columns; end > 1 && continues(end);) --end;
+    }
+    lines.emplace_back(text.substr(0, end));
+    text.remove_prefix(end);
+    text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
+  }
+  if (!text.empty()) lines.emplace_back(text);
+  return lines;
 }
 
 // Blue below zero, white at zero, red above: readable for the colour-blind as well.
@@ -162,16 +175,6 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
-// As much of a line as the picture is wide.
-std::string fitting(std::string_view line, double width_px) {
-  constexpr double letter_px = 6.6;  // of the small type, a wide one
-  const auto room = static_cast<std::size_t>(std::max((width_px - 2 * margin_px) / letter_px, 8.0));
-  if (line.size() <= room) return std::string{line};
-  std::size_t end = room - 3;
-  while (end > 0 && (static_cast<unsigned char>(line[end]) & 0xC0u) == 0x80u) --end;  // inside a character
-  return std::string{line.substr(0, end)} + "...";
-}
-
 // One path for each colour: cells of a colour together, so that the file stays small.
 std::string cells(const geometry::BSplineSurface& surface, const PlateField& field, const View& view,
                   double limit) {
@@ -216,10 +219,10 @@ std::string legend(const PlateField& field, double limit, double left, double to
   }
   for (const double part : {1.0, 0.5, 0.0, -0.5, -1.0}) {
     const std::string value = part == 0 ? "0" : fmt::format("{:+g}", part * limit);
-    svg += fmt::format("<text x='{:.1f}' y='{:.1f}' class='small'>{}</text>\n", left + 19,
-                       top + (1 - part) / 2 * height + 4, value);
+    svg += fmt::format("<text x='{:.1f}' y='{:.1f}'>{}</text>\n", left + 20,
+                       top + (1 - part) / 2 * height + 5, value);
   }
-  svg += fmt::format("<text x='{:.1f}' y='{:.1f}' class='small'>{}</text>\n", left, top - 9, field.unit);
+  svg += fmt::format("<text x='{:.1f}' y='{:.1f}'>{}</text>\n", left, top - 10, field.unit);
   return svg;
 }
 
@@ -280,15 +283,15 @@ std::string scale_bar(const View& view, double bottom) {
   const double decade = std::pow(10, std::floor(std::log10(wanted)));
   const double length = wanted >= 5 * decade ? 5 * decade : wanted >= 2 * decade ? 2 * decade : decade;
   return fmt::format(
-      "<path d='M{0:.1f} {1:.1f}v6h{2:.1f}v-6' fill='none' stroke='#111'/><text x='{3:.1f}' y='{4:.1f}' "
-      "class='small'>{5:g} mm</text>\n",
-      view.left, bottom + 12, length * view.scale, view.left + length * view.scale + 6, bottom + 20, length);
+      "<path d='M{0:.1f} {1:.1f}v6h{2:.1f}v-6' fill='none' stroke='#111'/><text x='{3:.1f}' "
+      "y='{4:.1f}'>{5:g} mm</text>\n",
+      view.left, bottom + 10, length * view.scale, view.left + length * view.scale + 8, bottom + 20, length);
 }
 
 std::string coloured_plate(const OverviewInput& in, const PlateField& field, const View& view,
                            const Layout& layout) {
   const double limit = nice_limit(field), bar = std::min(layout.plot_height - 20, 260.0);
-  return fmt::format("<text x='{:.1f}' y='{:.1f}' font-size='12'>{}</text>\n", view.left, view.top - 9,
+  return fmt::format("<text x='{:.1f}' y='{:.1f}'>{}</text>\n", view.left, view.top - 12,
                      escaped(field.title)) +
          cells(*in.surface, field, view, limit) +
          legend(field, limit, view.left + layout.plot_width + 12, view.top + (layout.plot_height - bar) / 2,
@@ -307,27 +310,36 @@ std::string legend_line(const OverviewInput& in) {
 
 std::string overview_svg(const OverviewInput& in) {
   View view = view_of(in);
-  const Layout layout = lay_out(std::max<std::size_t>(in.fields.size(), 1), view);
-  std::string svg = fmt::format(
-      "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {0:.0f} {1:.0f}' width='{0:.0f}' "
-      "height='{1:.0f}'>\n"
-      "<style>text{{font-family:sans-serif;fill:#111}}.small{{font-size:11px}}"
-      ".shot{{font-size:10px;text-anchor:middle;fill:#444}}</style>\n"
-      "<rect width='100%' height='100%' fill='#fff'/>\n"
-      "<text x='{2:.0f}' y='22' font-size='16' font-weight='bold'>{3}</text>"
-      "<text x='{2:.0f}' y='40' font-size='12'>{4}</text>\n"
-      "<text x='{2:.0f}' y='57' class='small'>{5}</text>\n",
-      layout.width(), layout.bottom() + legend_px, margin_px, escaped(in.title), escaped(in.subtitle),
-      escaped(fitting(in.about, layout.width())));
+  double y = margin_px;
+  const auto write = [&](std::string_view words, double height, std::string_view style) {
+    std::string svg;
+    for (const auto& line : lines_of(words, height)) {
+      svg += fmt::format("<text x='{:.0f}' y='{:.1f}'{}>{}</text>\n", margin_px, y, style, escaped(line));
+      y += line_px * height / letters_px;
+    }
+    return svg;
+  };
+  std::string body = write(in.title, title_px, " class='title'") + write(in.subtitle, letters_px, "") +
+                     write(in.about, letters_px, "");
+  const Layout layout = lay_out(std::max<std::size_t>(in.fields.size(), 1), y - letters_px, view);
   for (std::size_t i = 0; i < layout.panels; ++i) {
-    view.left = layout.left(i);
+    view.left = margin_px;
     view.top = layout.top(i);
-    if (i < in.fields.size() && in.surface != nullptr) svg += coloured_plate(in, in.fields[i], view, layout);
-    svg += overlay(in, view, i == 0) + outline(in, view) + scale_bar(view, view.top + layout.plot_height);
+    if (i < in.fields.size() && in.surface != nullptr) body += coloured_plate(in, in.fields[i], view, layout);
+    body += overlay(in, view, i == 0) + outline(in, view) + scale_bar(view, view.top + layout.plot_height);
   }
-  svg += fmt::format("<text x='{:.1f}' y='{:.1f}' class='small'>{}</text>\n</svg>\n", margin_px,
-                     layout.bottom(), legend_line(in));
-  return svg;
+  y = layout.bottom() + letters_px;
+  body += write(legend_line(in), letters_px, "");
+  // As wide as the window or the sheet at most; on paper it fills the sheet and is never cut.
+  return fmt::format(
+             "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {0:.0f} {1:.0f}' width='{0:.0f}' "
+             "height='{1:.0f}'>\n"
+             "<style>text{{font:{2}px sans-serif;fill:#111}}.title{{font-size:{3}px;font-weight:bold}}"
+             ".shot{{font-size:13px;text-anchor:middle;fill:#333}}svg{{max-width:100%;height:auto}}"
+             "@page{{size:A4;margin:12mm}}@media print{{svg{{width:100%;max-height:270mm}}}}</style>\n"
+             "<rect width='100%' height='100%' fill='#fff'/>\n",
+             width_px, y, letters_px, title_px) +
+         body + "</svg>\n";
 }
 
 PlateField shape_field(const geometry::BSplineSurface& surface, int count) {

@@ -26,7 +26,7 @@ struct PlateField {
 
 struct OverviewInput {
   std::string title, subtitle;
-  std::string about = {};                             // whose run it is; cut where it would leave the picture
+  std::string about = {};                             // whose run it is
   const geometry::BSplineSurface* surface = nullptr;  // null: only outline, path and shots
   std::span<const Eigen::Vector2d> edge_points{};
   std::span<const Eigen::Vector2d> corners{};

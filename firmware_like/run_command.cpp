@@ -43,9 +43,11 @@ std::string memory_line(const Controller& controller) {
 // What the run begins with: how much memory it has planned for, and what the operating system has not given.
 std::string head_lines(const Controller& controller, const RunConditions& conditions) {
   std::string lines = memory_line(controller);
-  for (const auto& complaint : complaints(conditions.setup)) lines += "\nnot real-time: " + complaint;
+  for (const auto& complaint : complaints(conditions.setup))
+    lines += "\n" + marked(Priority::warning, "not real-time: " + complaint);
   const Verdict verdict = verdict_on(conditions.environment, conditions.setup, conditions.realtime);
-  if (!verdict.representative) lines += "\ntiming is not representative: " + verdict.why();
+  if (!verdict.representative)
+    lines += "\n" + marked(Priority::notice, "timing is not representative: " + verdict.why());
   return lines;
 }
 
@@ -97,12 +99,18 @@ std::string how_it_ended(const Controller& controller, const RunOptions& options
 int say_complete(const std::filesystem::path& out) {
   const std::string line = fmt::format(
       "{0}: this run is complete, nothing is left to measure; `moldloft report {0}` shows it, another plate "
-      "needs "
-      "another --out",
+      "needs another --out",
       out.string());
   ServiceNotify{}.ready(line);
-  complain(line);
+  complain(line, "moldloft", Priority::notice);
   return exit_done;
+}
+
+// Stopped is what somebody has meant; held and aborted is what somebody has to see to.
+Priority priority_of(int exit_code) {
+  return exit_code == exit_stopped ? Priority::notice
+         : exit_code == exit_held  ? Priority::warning
+                                   : Priority::error;
 }
 
 // The same for a run that ended before the arm was sent anywhere: nothing was measured, nothing is kept.
@@ -142,7 +150,7 @@ std::expected<RunNames, std::string> names_given(const RunOptions& options) {
 
 }  // namespace
 
-int complain(std::string_view what, std::string_view program) {
+int complain(std::string_view what, std::string_view program, Priority priority) {
   // Several errors of a configuration stand on a line each.
   std::string lines;
   for (std::size_t begin = 0; begin <= what.size();) {
@@ -150,7 +158,7 @@ int complain(std::string_view what, std::string_view program) {
     lines += (begin == 0 ? "" : "\n") + hal::printable(what.substr(begin, end - begin));
     begin = end + 1;
   }
-  say(fmt::format("{}: {}\n", program, lines));
+  say(marked(priority, fmt::format("{}: {}\n", program, lines)));
   return exit_failed;
 }
 
@@ -219,7 +227,8 @@ std::optional<std::string> contradiction_in(const RunOptions& options) {
 
 // The run, from the first tick to the cell's rest, with all that goes on beside it.
 RunConditions run_beside_threads(Controller& controller, const CellConfig& config, const RunFolder& folder,
-                                 OperatorSocket* operator_socket, std::optional<ServiceThread>& service) {
+                                 const RunOptions& options, OperatorSocket* operator_socket,
+                                 std::optional<ServiceThread>& service) {
   RunConditions conditions{config.realtime, read_environment(config.realtime.cpu), {}, {}};
   FlightFiles flight{controller.flight(), folder.path};
   const CrashDump crash{controller, folder.path};
@@ -228,11 +237,15 @@ RunConditions run_beside_threads(Controller& controller, const CellConfig& confi
   const RecorderThread recorder{controller.recorder(), *folder.store, flight};
   std::optional<OperatorThread> operators;
   if (operator_socket != nullptr) operators.emplace(*operator_socket, controller.cell());
-  service.emplace(controller, folder.path);
+  const Surroundings around{.scanner = fmt::format("{}:{}", config.scanner.host, config.scanner.port),
+                            .robot = config.robot.device,
+                            .has_operator = operator_socket != nullptr};
+  service.emplace(controller, folder.path, around);
   conditions.setup = process.rows();
   std::ranges::copy(control.setup(), std::back_inserter(conditions.setup));
   conditions.setup.push_back(check_ordinary_threads(control.id(), config.realtime));
-  const DisplayThread display{controller.cell(), head_lines(controller, conditions)};
+  std::optional<DisplayThread> display;
+  if (!options.quiet) display.emplace(controller.cell(), head_lines(controller, conditions), around);
   control.begin();
   control.join();
   service->loop_has_ended();
@@ -245,7 +258,8 @@ int wind_up(Controller& controller, RunFolder folder, const RunOptions& options,
   const int code = exit_code(controller);
   if (!resumed && !controller.cell().has_driven()) {
     discard_run(std::move(folder));
-    return complain(why_refused(controller)), code == exit_aborted ? exit_failed : code;
+    return complain(why_refused(controller), "moldloft", priority_of(code)),
+           code == exit_aborted ? exit_failed : code;
   }
   const RunLabel label{.plate = folder.names.plate,
                        .seed = {},
@@ -265,11 +279,15 @@ int wind_up(Controller& controller, RunFolder folder, const RunOptions& options,
                          folder.path.string()));
   const auto written = write_results(controller, folder, label, summary);
   if (!written) complain(written.error().what);
-  if (code != exit_done) complain(how_it_ended(controller, options, folder.path.string()));
+  if (code != exit_done)
+    complain(how_it_ended(controller, options, folder.path.string()), "moldloft", priority_of(code));
   if (!written) return exit_failed;
   if (code != exit_done) return code;
-  const std::string table = result_table(summary, folder.path.string());
-  if (!show_within(patience_with_a_reader, table + timing_lines(timing_of(controller, &conditions))))
+  const std::string answer =
+      options.quiet ? fmt::format("complete: {}\n", folder.path.string())
+                    : result_table(summary, folder.path.string()) +
+                          timing_lines(timing_of(controller, &conditions));
+  if (!show_within(patience_with_a_reader, answer))
     complain(fmt::format("complete; the table cannot be written to standard output: moldloft report {}",
                          folder.path.string()));
   return store_failed ? exit_failed : exit_done;
@@ -311,7 +329,7 @@ int run_cell(const RunOptions& options) {
                                                      .attended = operator_socket.has_value()});
   signals.stops(controller.get());
   std::optional<ServiceThread> service;
-  RunConditions conditions = run_beside_threads(*controller, *config, *folder,
+  RunConditions conditions = run_beside_threads(*controller, *config, *folder, options,
                                                 operator_socket ? &*operator_socket : nullptr, service);
   signals.stops(nullptr);
   conditions.unsaid_lines = unsaid();

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "firmware_like/journal.hpp"
 #include "firmware_like/results.hpp"
 
 namespace moldloft::firmware_like {
@@ -19,7 +20,7 @@ enum ExitCode : int {
 };
 
 // The one line that a failure is, on standard error; the exit code that goes with it.
-int complain(std::string_view what, std::string_view program = "moldloft");
+int complain(std::string_view what, std::string_view program = "moldloft", Priority = Priority::error);
 
 struct RunOptions {
   std::string config_path;
@@ -28,6 +29,7 @@ struct RunOptions {
   // For a restart by a service manager: goes on with the run in `out` or begins it there, and either way comes up
   // held, not connected to any device, until an operator says unhold over `control`.
   bool resume_held = false;
+  bool quiet = false;   // no progress: only what went wrong, and the run's last line
   std::string control;  // path of the operator's socket; empty: none
   std::string go_on;    // the command that goes on with this run, where it is not this program's own
   std::optional<std::string> plate, remark;  // as typed; without a name the plate has the folder's

@@ -1,11 +1,37 @@
 #include "firmware_like/service_thread.hpp"
 
-#include "firmware_like/display.hpp"
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <utility>
+
+#include "firmware_like/console.hpp"
+#include "firmware_like/journal.hpp"
 
 namespace moldloft::firmware_like {
+namespace {
 
-ServiceThread::ServiceThread(const Controller& controller, const std::filesystem::path& run_folder)
-    : controller_{controller}, watch_{notify_, run_folder / "watchdog.json"}, thread_{[this] { work(); }} {}
+Priority priority_of(const tasks::Notice& notice) {
+  switch (notice.kind) {
+    case tasks::Notice::Kind::abort:
+      return Priority::error;
+    case tasks::Notice::Kind::hold:
+    case tasks::Notice::Kind::warning:
+      return Priority::warning;
+    case tasks::Notice::Kind::goes_on:
+      break;
+  }
+  return Priority::notice;
+}
+
+}  // namespace
+
+ServiceThread::ServiceThread(Controller& controller, const std::filesystem::path& run_folder,
+                             Surroundings around)
+    : controller_{controller},
+      around_{std::move(around)},
+      watch_{notify_, run_folder / "watchdog.json"},
+      thread_{[this] { work(); }} {}
 
 ServiceThread::~ServiceThread() {
   leaving_ = true;
@@ -17,10 +43,20 @@ void ServiceThread::work() {
   while (!leaving_) {
     watch_.look({.ticks = scheduler.heartbeat(),
                  .task = scheduler.name_of(scheduler.running_task()),
-                 .status = status_line(controller_.cell().progress()),
+                 .status = status_line(controller_.cell().progress(), around_),
                  .ended = ended_},
                 clock_.now());
+    pass_notices_on();
     clock_.sleep_until(clock_.now() + ServiceWatch::period);
+  }
+  pass_notices_on();
+}
+
+// On a terminal and in a file the progress says the same, and the run's last line what has ended it.
+void ServiceThread::pass_notices_on() {
+  while (const auto notice = controller_.cell().next_notice()) {
+    if (stderr_is_journal())
+      say(for_journal(priority_of(*notice), notice_line(*notice)));
   }
 }
 

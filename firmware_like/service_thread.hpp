@@ -1,4 +1,5 @@
-// The ordinary thread that looks at the control loop every 100 ms for as long as it lives (service_watch.hpp).
+// The ordinary thread that looks at the control loop every 100 ms for as long as it lives (service_watch.hpp), and
+// hands what the cell has noted to the journal, where standard error is one.
 #pragma once
 
 #include <atomic>
@@ -6,13 +7,14 @@
 #include <thread>
 
 #include "firmware_like/controller.hpp"
+#include "firmware_like/progress_text.hpp"
 #include "firmware_like/service_watch.hpp"
 
 namespace moldloft::firmware_like {
 
 class ServiceThread {
  public:
-  ServiceThread(const Controller&, const std::filesystem::path& run_folder);
+  ServiceThread(Controller&, const std::filesystem::path& run_folder, Surroundings);
   ~ServiceThread();
   ServiceThread(const ServiceThread&) = delete;
   ServiceThread& operator=(const ServiceThread&) = delete;
@@ -21,7 +23,9 @@ class ServiceThread {
 
  private:
   void work();
-  const Controller& controller_;
+  void pass_notices_on();
+  Controller& controller_;
+  const Surroundings around_;
   ServiceNotify notify_;
   ServiceWatch watch_;
   hal::SteadyClock clock_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "firmware_like/console.hpp"
+#include "firmware_like/journal.hpp"
 #include "firmware_like/results.hpp"
 
 namespace moldloft::firmware_like {
@@ -71,7 +72,7 @@ void ServiceWatch::say_status(const LoopSight& sight, hal::Instant now) {
 void ServiceWatch::tell_culprit(const LoopSight& sight) {
   const std::string line = fmt::format("the control loop has stood in '{}' for {:.1f} s, after {} ticks",
                                        sight.task, seconds(standing_), ticks_);
-  say(fmt::format("moldloft: {}\n", line));
+  say(marked(Priority::error, fmt::format("moldloft: {}\n", line)));
   notify_.status(line);
   const Json report = {{"schema", 1},
                        {"task", std::string{sight.task}},
@@ -79,12 +80,13 @@ void ServiceWatch::tell_culprit(const LoopSight& sight) {
                        {"stood_s", seconds(standing_)},
                        {"time", now_utc()}};
   if (const auto written = write_file(report_, json_text(report, 2) + "\n"); !written)
-    say(fmt::format("moldloft: {}\n", written.error().what));
+    say(marked(Priority::error, fmt::format("moldloft: {}\n", written.error().what)));
 }
 
 void ServiceWatch::tell_recovery(const LoopSight& sight, hal::Instant now) {
   told_ = false;
-  say(fmt::format("moldloft: the control loop goes on after {:.1f} s\n", seconds(standing_)));
+  say(marked(Priority::notice,
+             fmt::format("moldloft: the control loop goes on after {:.1f} s\n", seconds(standing_))));
   notify_.status(sight.status);
   status_ = sight.status;
   last_status_ = now;

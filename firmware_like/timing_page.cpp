@@ -18,8 +18,6 @@ constexpr std::string_view style = R"(
 --ours:#1f6fb2;--theirs:#c2571a;--good:#1d7a46;--bad:#b3261e;--panel:#f6f8fa}
 @media (prefers-color-scheme:dark){:root{--paper:#14181d;--ink:#e4e9ef;--soft:#9aa6b4;--line:#39424d;--fine:#222931;
 --ours:#5aa9e6;--theirs:#f0955a;--good:#5cc48a;--bad:#ff8a80;--panel:#1b2128}}
-@media print{:root{--paper:#fff;--ink:#000;--soft:#444;--line:#bbb;--fine:#e6e6e6;--ours:#1f6fb2;--theirs:#c2571a;
---good:#1d7a46;--bad:#b3261e;--panel:#fff}section{break-inside:avoid}main{max-width:none;padding:0}}
 body{margin:0;background:var(--paper);color:var(--ink);font:15px/1.45 system-ui,"Segoe UI",sans-serif}
 main{max-width:960px;margin:0 auto;padding:24px 20px 48px}
 h1{font-size:24px;margin:0 0 4px}h2{font-size:17px;margin:34px 0 6px}p{margin:4px 0 10px}
@@ -38,6 +36,17 @@ svg{width:100%;height:auto;display:block}.grid{stroke:var(--line)}.fine{stroke:v
 .tick{fill:var(--soft);font:12px system-ui,"Segoe UI",sans-serif}
 .s0{fill:var(--ours);fill-opacity:.35;stroke:var(--ours);stroke-width:1.4}
 .s1{fill:none;stroke:var(--theirs);stroke-width:1.8}
+.slim{display:none}
+@media screen and (max-width:640px){.slim{display:block}.broad{display:none}main{padding:16px 12px 32px}
+table{font-size:12px}th,td{padding:3px 4px}th,td:first-child,td.word,.words td:first-child{white-space:normal}
+.words td{overflow-wrap:anywhere}
+.stats :is(th,td):is(:nth-child(3),:nth-child(7),:nth-child(9),:nth-child(10)){display:none}}
+@page{size:A4;margin:14mm}
+@media print{:root{--paper:#fff;--ink:#000;--soft:#444;--line:#bbb;--fine:#e6e6e6;--ours:#1f6fb2;--theirs:#c2571a;
+--good:#1d7a46;--bad:#b3261e;--panel:#fff}body{font-size:10pt}main{max-width:none;padding:0}section{break-inside:avoid}
+h2{margin-top:22px;break-after:avoid}tr{break-inside:avoid}.wide{overflow:visible}table{font-size:8.5pt}
+th,td{padding:2px 4px}th,.words td,.words td:first-child{white-space:normal}.words td{overflow-wrap:anywhere}
+.s0,.tile,.verdict{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
 )";
 
 std::string escaped(std::string_view text) {
@@ -101,6 +110,21 @@ std::string section(std::string_view title, std::string_view lead, const std::st
   return fmt::format("<section>\n<h2>{}</h2>\n<p class=\"soft\">{}</p>\n{}</section>\n", title, lead, body);
 }
 
+// Twice: for a page and for a telephone, where the same drawing would be too small to read.
+std::string plot_in_both_widths(LogPlot plot) {
+  const std::string broad = log_plot(plot);
+  plot.width_px = 376;
+  plot.height_px = 240;
+  return fmt::format("<div class=\"broad\">{}</div>\n<div class=\"slim\">{}</div>\n", broad, log_plot(plot));
+}
+
+// The table of statistics keeps its most telling columns on a telephone.
+std::string statistics(const std::vector<Cell>& head, const std::string& rows) {
+  return table(head, rows, "stats") +
+         "<p class=\"slim soft\">In part: a wider window shows min, p99.99, mean and deviation as "
+         "well.</p>\n";
+}
+
 std::string tile(std::string_view name, const std::string& value, std::string_view mark = "") {
   return fmt::format("<div class=\"tile\"><span class=\"soft\">{}</span><b class=\"{}\">{}</b></div>\n", name,
                      mark, value);
@@ -151,18 +175,19 @@ std::string wake_up(const Json& t) {
   if (t.contains("compared")) {
     const Json& c = t.at("compared");
     std::string body =
-        log_plot({.series = {{"ours, with fit and recorder busy", histogram_from(c.at("ours"))},
-                             {"cyclictest, alone", histogram_from(c.at("cyclictest"))}},
-                  .label = "wake-up latency",
-                  .whole_us = true});
+        plot_in_both_widths({.series = {{"ours, with fit and recorder busy", histogram_from(c.at("ours"))},
+                                        {"cyclictest, alone", histogram_from(c.at("cyclictest"))}},
+                             .label = "wake-up latency",
+                             .whole_us = true});
     std::vector<Cell> ratio = {{"ratio"}, {""}, {""}};
     for (const auto& p : percentiles) {
       const std::string key = p.key;
       ratio.push_back({figure(c, ("ratio_" + key.substr(0, key.size() - 3)).c_str())});
     }
     for (const auto& text : {figure(c, "ratio_max"), std::string{}, std::string{}}) ratio.push_back({text});
-    body += table(histogram_head("us"), histogram_row("ours", c.at("ours")) +
-                                            histogram_row("cyclictest", c.at("cyclictest")) + row(ratio));
+    body +=
+        statistics(histogram_head("us"), histogram_row("ours", c.at("ours")) +
+                                             histogram_row("cyclictest", c.at("cyclictest")) + row(ratio));
     return section(
         "How late a tick begins",
         "From the time at which a tick is due to the moment at which the control thread runs. Both were "
@@ -176,7 +201,8 @@ std::string wake_up(const Json& t) {
       fmt::format("From the time at which a tick is due to the moment at which the control thread runs. The "
                   "latest came at {} s.",
                   moment_s(t, "latest_wake_up_at_ms")),
-      log_plot({.series = {{"ours", histogram_from(t.at("wake_up"))}}, .label = "wake-up latency"}));
+      plot_in_both_widths(
+          {.series = {{"ours", histogram_from(t.at("wake_up"))}}, .label = "wake-up latency"}));
 }
 
 std::string plot_of(const Json& t, const char* key, std::string_view title, std::string_view lead,
@@ -184,7 +210,7 @@ std::string plot_of(const Json& t, const char* key, std::string_view title, std:
   if (!measured(t, key)) return "";
   return section(
       title, lead,
-      log_plot(
+      plot_in_both_widths(
           {.series = {{"", histogram_from(t.at(key))}}, .label = std::string{label}, .smallest = smallest}));
 }
 
@@ -207,7 +233,7 @@ std::string distributions(const Json& t) {
       "Microseconds. The table runs at the begin of a tick, background work in the slack that it leaves.";
   if (!measured(t, "frame_to_command"))
     lead += " From frame to command is measured in runs with devices only.";
-  return section("Everything that was timed", lead, table(histogram_head(""), rows));
+  return section("Everything that was timed", lead, statistics(histogram_head(""), rows));
 }
 
 Cell count_cell(const Json& j, const char* key) {

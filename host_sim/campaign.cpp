@@ -6,13 +6,14 @@
 
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <filesystem>
+#include <limits>
 #include <mutex>
 #include <thread>
 #include <vector>
 
 #include "firmware_like/console.hpp"
+#include "firmware_like/option_values.hpp"
 #include "host_sim/simulated_run.hpp"
 
 namespace moldloft::host_sim {
@@ -27,6 +28,9 @@ using firmware_like::Json;
 // What every plate of the standard campaign must keep to (README, "What it reaches").
 constexpr double max_normal_rms_mm = 0.02, max_normal_max_mm = 0.08, max_outline_mm = 0.3,
                  max_corner_mm = 0.3;
+
+// Some hours of all plates; more is a slip of the finger.
+constexpr std::uint64_t most_seeds = 10'000;
 
 struct Job {
   std::string plate;
@@ -43,25 +47,14 @@ struct Row {
   bool good = false;
 };
 
-bool parse_seeds(const std::string& text, std::uint64_t& first, std::uint64_t& last) {
-  const auto dots = text.find("..");
-  const std::string a = text.substr(0, dots), b = dots == std::string::npos ? a : text.substr(dots + 2);
-  const auto parse = [](const std::string& s, std::uint64_t& value) {
-    const auto end = s.data() + s.size();
-    return !s.empty() && std::from_chars(s.data(), end, value).ptr == end;
-  };
-  return parse(a, first) && parse(b, last) && first <= last;
-}
-
 std::vector<Job> jobs_for(const CampaignOptions& options) {
-  std::uint64_t first = 1, last = 0;
-  if (!parse_seeds(options.seeds, first, last)) return {};
   std::vector<Job> jobs;
   for (const auto& plate : shape_names()) {
     if (options.plates != "all" && options.plates != plate) continue;
     for (const auto& outline : outline_names()) {
       if (options.outlines != "all" && options.outlines != outline) continue;
-      for (auto seed = first; seed <= last; ++seed) {
+      for (auto left = options.seeds.last - options.seeds.first + 1, seed = options.seeds.first; left > 0;
+           --left, ++seed) {
         jobs.push_back({std::string{plate}, *outline_named(outline), std::string{outline}, seed});
       }
     }
@@ -131,6 +124,20 @@ void print_summary(const std::vector<Row>& rows) {
 }
 
 }  // namespace
+
+std::expected<SeedRange, SimError> seeds_from(std::string_view text) {
+  const auto dots = text.find("..");
+  const std::string_view a = text.substr(0, dots), b = dots == text.npos ? a : text.substr(dots + 2);
+  const firmware_like::Limits<std::uint64_t> any{0, std::numeric_limits<std::uint64_t>::max()};
+  SeedRange seeds;
+  const bool read =
+      firmware_like::read_number(a, any, seeds.first) && firmware_like::read_number(b, any, seeds.last);
+  if (!read || seeds.first > seeds.last || seeds.last - seeds.first >= most_seeds)
+    return std::unexpected(SimError{
+        fmt::format("'{}' given; A..B or A is wanted, whole numbers from 0 on, the smaller first, {} at most",
+                    text, most_seeds)});
+  return seeds;
+}
 
 int run_campaign(const CampaignOptions& options) {
   const auto jobs = jobs_for(options);

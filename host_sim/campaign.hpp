@@ -3,17 +3,25 @@
 #pragma once
 
 #include <cstdint>
+#include <expected>
 #include <string>
+#include <string_view>
 
 #include "host_sim/cell_description.hpp"
 
 namespace moldloft::host_sim {
 
+struct SeedRange {
+  std::uint64_t first = 1, last = 3;  // both inclusive
+};
+// "A..B" or "A": at most 10,000 seeds, the first not beyond the last.
+std::expected<SeedRange, SimError> seeds_from(std::string_view text);
+
 struct CampaignOptions {
   CellDescription cell;          // what all runs have in common
   std::string plates = "all";    // or one shape's name
   std::string outlines = "all";  // or one outline's name
-  std::string seeds = "1..3";    // A..B or A
+  SeedRange seeds;
   bool json = false;
   std::string out;  // keep the run folders here; empty: they are removed
 };

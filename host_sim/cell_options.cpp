@@ -1,10 +1,17 @@
 #include "host_sim/cell_options.hpp"
 
+#include <cstdint>
+#include <limits>
 #include <string>
+
+#include "firmware_like/option_values.hpp"
 
 namespace moldloft::host_sim {
 
 namespace {
+
+// Plates beyond these are no plates of a cell; what its arm can reach is found out when the plate is put down.
+const firmware_like::Limits<double> length{1, 10'000, "mm"}, shift{-10'000, 10'000, "mm"};
 
 // An option whose words are looked up; an unknown word is refused with the words that are known.
 template <typename Value, typename Lookup>
@@ -41,17 +48,19 @@ void add_cell_options(CLI::App& command, CellDescription& cell) {
   add_named(command, "--unit", cell.unit, unit_named, "unit of the mesh file: mm (default), cm, m or inch");
   add_named(command, "--outline", cell.outline, outline_named,
             "square (default), rectangle, trapezoid or parallelogram");
-  command.add_option("--width", cell.sizes.width_mm, "lower side, mm")->check(CLI::PositiveNumber);
-  command.add_option("--depth", cell.sizes.depth_mm, "extent across it, mm")->check(CLI::PositiveNumber);
-  command.add_option("--top-width", cell.sizes.top_width_mm, "trapezoid: upper side, mm")
-      ->check(CLI::PositiveNumber);
-  command.add_option("--shear", cell.sizes.shear_mm, "parallelogram: shift of the upper side, mm");
-  command.add_option("--thickness", cell.thickness_mm, "mm")->capture_default_str();
-  command.add_option("--amplitude", cell.amplitude_mm, "of saddle, twist, dome, wave, mm")
-      ->capture_default_str();
-  command.add_option("--radius", cell.radius_mm, "of the cylinder, mm")->capture_default_str();
+  using firmware_like::add_number;
+  using firmware_like::add_number_with_default;
+  add_number(command, "--width", cell.sizes.width_mm, length, "lower side, mm");
+  add_number(command, "--depth", cell.sizes.depth_mm, length, "extent across it, mm");
+  add_number(command, "--top-width", cell.sizes.top_width_mm, length, "trapezoid: upper side, mm");
+  add_number(command, "--shear", cell.sizes.shear_mm, shift, "parallelogram: shift of the upper side, mm");
+  add_number_with_default(command, "--thickness", cell.thickness_mm, {0.5, 200.0, "mm"}, "mm");
+  add_number_with_default(command, "--amplitude", cell.amplitude_mm, {-500.0, 500.0, "mm"},
+                          "of saddle, twist, dome, wave, mm");
+  add_number_with_default(command, "--radius", cell.radius_mm, {1.0, 1e6, "mm"}, "of the cylinder, mm");
   add_named(command, "--arm", cell.arm, arm_named, "scara (default) or gantry");
-  command.add_option("--seed", cell.seed, "draws placement, noise and errors")->capture_default_str();
+  add_number_with_default(command, "--seed", cell.seed, {0, std::numeric_limits<std::uint64_t>::max()},
+                          "draws placement, noise and errors");
   command.parse_complete_callback([&command, &cell] { refuse_contradictions(command, cell); });
 }
 

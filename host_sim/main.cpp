@@ -1,14 +1,20 @@
 // moldloft-sim: the simulated cell as a program.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <span>
 #include <sstream>
 
 #include "firmware_like/build_info.hpp"
 #include "firmware_like/command_line.hpp"
 #include "firmware_like/console.hpp"
 #include "firmware_like/display.hpp"
+#include "firmware_like/option_values.hpp"
 #include "firmware_like/plate_name.hpp"
 #include "firmware_like/run_command.hpp"
 #include "hal/printable_text.hpp"
@@ -20,6 +26,7 @@
 #include "host_sim/simulated_run.hpp"
 
 using namespace moldloft::host_sim;
+using moldloft::firmware_like::add_number_with_default;
 using moldloft::firmware_like::say;
 using moldloft::firmware_like::show;
 
@@ -48,12 +55,14 @@ int judge_command(const std::string& folder, const CellDescription& cell) {
   return 0;
 }
 
-int cell_command(SimulatedRunOptions& options) {
+int cell_command(SimulatedRunOptions& options, bool quiet) {
+  using namespace moldloft::firmware_like;
   options.on_plate = say_remarks;
-  const bool terminal = isatty(STDERR_FILENO) != 0;
+  const bool terminal = !quiet && renews_lines(STDERR_FILENO, std::getenv("TERM"));
   if (terminal) {
     options.on_progress = [](const moldloft::tasks::CellProgress& p) {
-      say(fmt::format("\r\x1b[K{}", moldloft::firmware_like::progress_line(p)));
+      const auto columns = terminal_columns(STDERR_FILENO, std::getenv("COLUMNS"));
+      say(fmt::format("\r\x1b[K{}", progress_line_within(std::max<std::size_t>(columns, 2) - 1, p)));
     };
   }
   const auto run = simulate(options);
@@ -67,11 +76,12 @@ int cell_command(SimulatedRunOptions& options) {
                     run->summary["message"].get<std::string>()));
     return run->exit_code;
   }
-  show(fmt::format("{}", moldloft::firmware_like::result_table(run->summary, run->folder.string())));
+  show(quiet ? fmt::format("complete: {}\n", run->folder.string())
+             : result_table(run->summary, run->folder.string()));
   return 0;
 }
 
-void add_cell_command(CLI::App& app, SimulatedRunOptions& options) {
+void add_cell_command(CLI::App& app, SimulatedRunOptions& options, bool& quiet) {
   auto* command = app.add_subcommand("cell", "the whole cell in one thread: controller, cables and devices");
   add_cell_options(*command, options.cell);
   command->add_option("--out", options.out, "the run's folder; default: a new one under out/");
@@ -89,6 +99,7 @@ void add_cell_command(CLI::App& app, SimulatedRunOptions& options) {
            "the plate's name in all results; default: its shape and seed");
   add_text("--remark", options.remark, moldloft::firmware_like::longest_remark,
            "one line of yours that goes into all results");
+  command->add_flag("--quiet", quiet, "no progress: only what went wrong, and the last line");
   command
       ->add_option_function<std::string>(
           "--clock", [&](const std::string& c) { options.real_time = c == "real"; },
@@ -96,11 +107,28 @@ void add_cell_command(CLI::App& app, SimulatedRunOptions& options) {
       ->check(CLI::IsMember({"virtual", "real"}));
 }
 
+CLI::Validator all_or_one_of(std::span<const std::string_view> names) {
+  const auto check = [names](const std::string& word) {
+    if (word == "all" || std::ranges::find(names, word) != names.end()) return std::string{};
+    return fmt::format("'{}' given; all, or one of {} is wanted", word, fmt::join(names, ", "));
+  };
+  return {check, ""};
+}
+
 void add_campaign_command(CLI::App& app, CampaignOptions& options) {
   auto* command = app.add_subcommand("campaign", "many simulated runs: shapes x outlines x seeds");
-  command->add_option("--plates", options.plates, "all, or one shape")->capture_default_str();
-  command->add_option("--outlines", options.outlines, "all, or one outline")->capture_default_str();
-  command->add_option("--seeds", options.seeds, "A..B or A")->capture_default_str();
+  command->add_option("--plates", options.plates, "all, or one shape")
+      ->capture_default_str()
+      ->check(all_or_one_of(shape_names()));
+  command->add_option("--outlines", options.outlines, "all, or one outline")
+      ->capture_default_str()
+      ->check(all_or_one_of(outline_names()));
+  const auto read_seeds = [&options](const std::string& word) {
+    const auto seeds = seeds_from(word);
+    if (!seeds) throw CLI::ValidationError("--seeds", seeds.error().what);
+    options.seeds = *seeds;
+  };
+  command->add_option_function<std::string>("--seeds", read_seeds, "A..B or A")->default_str("1..3");
   command->add_option("--out", options.out, "keep the run folders here");
   command->add_flag("--json", options.json, "an array of objects instead of the table");
 }
@@ -109,14 +137,10 @@ void add_day_command(CLI::App& app, DayOptions& options) {
   auto* command =
       app.add_subcommand("day", "plate after plate in virtual time, and what must not grow meanwhile");
   add_cell_options(*command, options.cell);
-  command->add_option("--hours", options.hours, "of cell time")
-      ->capture_default_str()
-      ->check(CLI::Range(0.01, 1e4));
-  command->add_option("--every", options.every_s, "seconds from one plate's start to the next")
-      ->capture_default_str();
-  command->add_option("--rows", options.rows, "of the table")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 1000));
+  add_number_with_default(*command, "--hours", options.hours, {0.01, 1e4, "h"}, "of cell time");
+  add_number_with_default(*command, "--every", options.every_s, {0.0, 86'400.0, "s"},
+                          "seconds from one plate's start to the next");
+  add_number_with_default(*command, "--rows", options.rows, {1, 1000}, "of the table");
   command->add_flag("--json", options.json, "one object instead of the table");
 }
 
@@ -134,8 +158,8 @@ int run_command_line(int argc, char** argv) {
   auto* devices_command =
       app.add_subcommand("devices", "serve scanner and robot in real time until interrupted");
   add_cell_options(*devices_command, devices.cell);
-  devices_command->add_option("--scanner-port", devices.scanner_port, "loopback TCP port, 0 for any")
-      ->capture_default_str();
+  add_number_with_default(*devices_command, "--scanner-port", devices.scanner_port, {0, 65535},
+                          "loopback TCP port, 0 for any");
   auto* pty = devices_command->add_option("--robot-pty", devices.robot_pty, "name for the robot's terminal")
                   ->capture_default_str();
   auto* serial = devices_command
@@ -153,7 +177,8 @@ int run_command_line(int argc, char** argv) {
   devices_command->add_flag("--force", devices.force, "... even over one that was written by hand");
 
   SimulatedRunOptions run;
-  add_cell_command(app, run);
+  bool quiet = false;
+  add_cell_command(app, run, quiet);
   CampaignOptions campaign;
   add_campaign_command(app, campaign);
 
@@ -168,7 +193,7 @@ int run_command_line(int argc, char** argv) {
 
   if (const auto ended = moldloft::firmware_like::parse_command_line(app, argc, argv)) return *ended;
   if (devices_command->parsed()) return run_devices(devices);
-  if (app.got_subcommand("cell")) return cell_command(run);
+  if (app.got_subcommand("cell")) return cell_command(run, quiet);
   if (app.got_subcommand("campaign")) return run_campaign(campaign);
   if (app.got_subcommand("day")) return show_day(day);
   return judge_command(folder, judged);

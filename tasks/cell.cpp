@@ -55,7 +55,8 @@ Cell::Cell(const CellSettings& settings, Clock& clock, hal::Scanner& scanner, ha
       epoch_{settings.epoch},
       tracker_{settings.tracker},
       view_{settings.max_stripes, settings.max_points, settings.view},
-      surface_places_(settings.max_surface_shots) {
+      surface_places_(settings.max_surface_shots),
+      time_left_{settings.tracker, settings.scan} {
   boundary_places_.reserve(static_cast<std::size_t>(settings.tracker.max_shots) + 1);
 }
 
@@ -69,6 +70,7 @@ void Cell::command(CellEvent event) {
 }
 
 void Cell::run(Instant now) {
+  if (state_ == CellState::execute) measuring_ += now - now_;
   now_ = now;
   account();
   if (const auto commands = static_cast<unsigned>(commands_.load(std::memory_order_relaxed)); commands != 0) {
@@ -93,6 +95,9 @@ void Cell::apply(CellEvent event, const hal::Message& text) {
   const auto* row = find_transition(cell_transitions(), state_, event, CellContext{.begun = begun_});
   if (row == nullptr) return;
   record("cell", to_string(event), to_string(state_), to_string(row->to), text);
+  if (event == CellEvent::hold) note(Notice::Kind::hold, text);
+  if (event == CellEvent::abort) note(Notice::Kind::abort, text);
+  if (event == CellEvent::unhold) note(Notice::Kind::goes_on, cause_ == HoldCause::person ? "unhold" : why_);
   state_ = row->to;
   entered_ = now_;
   enter(row->action);
@@ -151,6 +156,7 @@ void Cell::hold(HoldCause cause, const hal::Message& why) {
     cause_ = cause;
     why_ = why;
     record("cell", "hold", to_string(state_), to_string(state_), why);
+    note(Notice::Kind::hold, why);
   }
   if (state_ != CellState::execute && state_ != CellState::unholding) return;
   cause_ = cause;
@@ -185,6 +191,7 @@ void Cell::on_robot(const hal::RobotEvent& event) {
       break;
     case Kind::refused:
       record("robot", "refused", "", "", event.text);
+      note(Notice::Kind::warning, event.text);
       // The motion that a stop has ended answers with a refusal too, and may do so late: nothing may be sent after it.
       if (is_ending(state_)) break;
       if (state_ != CellState::execute && state_ != CellState::holding) {
@@ -246,11 +253,13 @@ void Cell::on_scanner(const hal::ScannerEvent& event) {
       break;
     case Kind::shot_failed:
       record("scanner", "shot failed", "", "", event.text);
+      note(Notice::Kind::warning, event.text);
       drop_look();
       give_up(event.text);
       break;
     case Kind::lost:
       record("scanner", "lost", "", "", event.text);
+      if (state_ != CellState::execute) note(Notice::Kind::warning, event.text);
       drop_look();
       hold(HoldCause::scanner, waiting_for_scanner(event.text, settings_.scanner_wait));
       break;
@@ -372,6 +381,38 @@ void Cell::account() {
   if (!scanner_works) cycle_.idle += past;
 }
 
+Awaited Cell::awaited() const {
+  const bool scanner = settings_.devices && !scanner_ready();
+  const bool robot = settings_.devices && robot_.state() != hal::RobotState::ready;
+  const Awaited device = scanner && robot ? Awaited::both
+                         : scanner        ? Awaited::scanner
+                         : robot          ? Awaited::robot
+                                          : Awaited::nothing;
+  switch (state_) {
+    case CellState::starting:
+      return start_step_ == StartStep::calibrating && robot_.state() == hal::RobotState::moving
+                 ? Awaited::calibration
+                 : device;
+    case CellState::holding:
+    case CellState::stopping:
+    case CellState::aborting:
+      return Awaited::arm_at_rest;
+    case CellState::held:
+      return cause_ == HoldCause::scanner    ? Awaited::scanner
+             : cause_ == HoldCause::recorder ? Awaited::disk
+             : cause_ == HoldCause::person   ? Awaited::word_unhold
+                                             : Awaited::nothing;  // it would only come to the same again
+    case CellState::unholding:
+      return device;
+    case CellState::aborted:
+      return cause_ < HoldCause::plan ? Awaited::word_clear : Awaited::nothing;
+    case CellState::clearing:
+      return robot ? Awaited::robot : Awaited::nothing;
+    default:
+      return Awaited::nothing;
+  }
+}
+
 void Cell::publish() {
   CellProgress p{.state = state_, .phase = phase_, .cause = cause_, .now = now_, .why = why_};
   p.boundary_shots = taken_[static_cast<std::size_t>(hal::ShotPurpose::seek)] +
@@ -381,21 +422,17 @@ void Cell::publish() {
   p.retaken = retaken_;
   if (phase_ == Phase::scan_surface && surface_planned_ > 0) {
     p.part_done = static_cast<double>(p.surface_shots) / static_cast<double>(surface_planned_);
-    // A shot takes as long as those before it did on average; the boundary's shots take about as long.
-    const int taken = p.boundary_shots + p.surface_shots;
-    if (taken > 0) p.time_left = (now_ - started_) / taken * (p.surface_planned - p.surface_shots);
   } else if (phase_ == Phase::finish_fit) {
     p.part_done = surface_.progress();
-    p.time_left = Duration{0};
   }
-  // Nothing is wrong yet, and the cell waits: for whom, and what that one says.
-  const bool waits =
-      state_ == CellState::starting || state_ == CellState::unholding || state_ == CellState::clearing;
-  if (waits && settings_.devices && p.why.empty() && !devices_ready()) {
-    p.why = !scanner_ready()                            ? why_not_ready("scanner", scanner_.why())
-            : robot_.state() == hal::RobotState::moving ? hal::Message{"the arm calibrates"}
-                                                        : why_not_ready("robot", robot_.why());
+  if (state_ == CellState::execute) {
+    if (surface_planned_ > 0) time_left_.planned(surface_planned_);
+    p.time_left = time_left_.left(measuring_);
+    p.left_is_planned = time_left_.is_planned();
   }
+  p.awaited = awaited();
+  if (p.awaited == Awaited::scanner || p.awaited == Awaited::both) p.awaited_why.assign(scanner_.why());
+  if (p.awaited == Awaited::robot) p.awaited_why.assign(robot_.why());
   published_.set(p);
 }
 

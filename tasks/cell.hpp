@@ -22,14 +22,17 @@
 #include "hal/robot.hpp"
 #include "hal/scanner.hpp"
 #include "tasks/boundary_tracker.hpp"
+#include "tasks/cell_progress.hpp"
 #include "tasks/cell_state.hpp"
 #include "tasks/clock_drift.hpp"
 #include "tasks/motion_guard.hpp"
+#include "tasks/notice.hpp"
 #include "tasks/scan_plan.hpp"
 #include "tasks/scheduler.hpp"
 #include "tasks/shot_archive.hpp"
 #include "tasks/shot_sequence.hpp"
 #include "tasks/surface_task.hpp"
+#include "tasks/time_left.hpp"
 
 namespace moldloft::tasks {
 
@@ -53,26 +56,6 @@ struct CellSettings {
   bool devices = true;      // false: only archived shots, nothing moves
 };
 
-enum class HoldCause : std::uint8_t {
-  none,
-  scanner,      // ends by itself when the scanner is back
-  recorder,     // ends by itself when the disk takes records again
-  person,       // something must be seen to; the run can be resumed then
-  plan,         // the plate outgrows the memory plan: the run can be resumed with a larger one
-  measurement,  // what was measured, planned or configured leads here each time: resuming would only repeat it
-};
-
-struct CellProgress {  // for people; trivially copyable
-  CellState state = CellState::idle;
-  Phase phase = Phase::none;
-  HoldCause cause = HoldCause::none;
-  int boundary_shots = 0, surface_shots = 0, surface_planned = 0, retaken = 0;
-  double part_done = 0;  // of the phase, 0..1
-  Instant now{0};
-  Duration time_left{-1};  // negative: not known yet
-  hal::Message why;
-};
-
 struct CycleTimes {  // over the whole run, from start to the end of Execute
   Duration total{0}, standing{0}, idle{0};
 };
@@ -91,6 +74,12 @@ class Cell final : public Task {
   // On the control thread, when the robot's driver has written what it had.
   void commands_sent(Instant now) MOLDLOFT_NONBLOCKING;
   CellProgress progress() const { return published_.get(); }
+  // On the control thread: something that a person should read.
+  void note(Notice::Kind kind, const hal::Message& text) MOLDLOFT_NONBLOCKING {
+    notices_.push({now_, kind, text});
+  }
+  // On one other thread: what has been noted since, in order.
+  std::optional<Notice> next_notice() { return notices_.pop(); }
   CellState state() const { return state_; }
   Phase phase() const { return phase_; }
   HoldCause cause() const { return cause_; }
@@ -139,6 +128,7 @@ class Cell final : public Task {
   bool scanner_ready() const MOLDLOFT_NONBLOCKING;
   bool devices_ready() const MOLDLOFT_NONBLOCKING;
   void account() MOLDLOFT_NONBLOCKING;
+  Awaited awaited() const MOLDLOFT_NONBLOCKING;
   void publish() MOLDLOFT_NONBLOCKING;
   void record(std::string_view source, std::string_view event, std::string_view from, std::string_view to,
               const hal::Message& text = {}) MOLDLOFT_NONBLOCKING;
@@ -212,9 +202,12 @@ class Cell final : public Task {
   int retaken_ = 0;
   std::uint64_t points_seen_ = 0;
   CycleTimes cycle_;
+  TimeLeft time_left_;
+  Duration measuring_{0};  // in Execute, since measure()
   Histogram frame_to_command_, data_age_;
   ClockDrift scanner_clock_;
   hal::LatestValue<CellProgress> published_;
+  NoticeQueue notices_;
 };
 
 }  // namespace moldloft::tasks

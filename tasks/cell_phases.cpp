@@ -42,6 +42,8 @@ void Cell::measure() {
   surface_planned_ = surface_next_ = 0;
   plan_begun_ = false;
   heights_.reset();
+  measuring_ = Duration{0};
+  time_left_.begin(settings_.start.centre.head<2>());
   surface_.begin();
   tracker_.begin(settings_.start);
   want(settings_.start, ShotPurpose::seek);
@@ -105,6 +107,10 @@ void Cell::accept(const hal::Frame& frame) {
   accepted_ = true;
   ++taken_[static_cast<std::size_t>(looked_at_.purpose)];
   points_seen_ += frame.point_count;
+  time_left_.took({.purpose = looked_at_.purpose,
+                   .centre = looked_at_.place.centre.head<2>(),
+                   .spent = measuring_,
+                   .from_archive = archive_ != nullptr && looked_at_.number <= archive_->last()});
 }
 
 void Cell::use_shot() {
@@ -170,10 +176,12 @@ void Cell::use_boundary_shot(const Order& order, const geometry::RigidMotion& wo
     case TrackState::closed:
       set_phase(Phase::plan_scan);
       heights_.solve();
+      time_left_.boundary_is_closed();
       return surface_.build_outline(tracker_.edge_points(), tracker_.corners());
     case TrackState::seek_edge:
       break;
     default:
+      time_left_.edge_is_found();
       set_phase(Phase::track_boundary);
       break;
   }

@@ -21,6 +21,7 @@ GOOD = {
         "crash_motions_while_held": "0", "crash_dump": "flight-crash.bin", "standstill_restarts": "2",
         "standstill_state": "Held", "standstill_motions_while_held": "0", "end_folder": "moldloft 750", "prerm": "0",
         "prerm_active": "inactive", "wrong_start": "1", "wrong_active": "failed", "wrong_restarts": "0", "wrong_status": "1",
+        "hold_journal": "1", "wrong_journal": "1",
     },
     "process": {"Uid": "999 999 999 999", "CapEff": "0" * 16, "CapBnd": "0" * 16, "NoNewPrivs": "1", "Seccomp": "2"},
     "threads": ["moldloft scheduling policy: SCHED_OTHER", "control scheduling policy: SCHED_FIFO|SCHED_RESET_ON_FORK"],

@@ -148,8 +148,8 @@ TEST_CASE("the page says first whether the run is representative, and why not") 
 
 TEST_CASE("the page shows ours and cyclictest in one drawing, every task, miss and budget") {
   const std::string page = timing_page(report(), "run");
-  CHECK(count_of(page, "<path class=\"s0\"") == 3);  // wake-up, execution, slack
-  CHECK(count_of(page, "<path class=\"s1\"") == 1);
+  CHECK(count_of(page, "<path class=\"s0\"") == 2 * 3);  // wake-up, execution, slack, each in two widths
+  CHECK(count_of(page, "<path class=\"s1\"") == 2);
   CHECK(page.find("ours, with fit and recorder busy") != page.npos);
   CHECK(page.find("cyclictest, alone") != page.npos);
   for (const char* heading : {"How late a tick begins", "Everything that was timed", "Missed ticks", "Tasks",
@@ -207,6 +207,52 @@ TEST_CASE("a run in virtual time has a page without machine and comparison") {
   CHECK(flaw_of(page) == "");
   CHECK(page.find("The machine") == page.npos);
   CHECK(count_of(page, "<path class=\"s1\"") == 0);
+}
+
+TEST_CASE("the page fits a telephone of 400 px and a sheet of A4, and no digit is cut off") {
+  const std::string page = timing_page(report(), "run");
+  // Narrow: drawings of their own, 376 px wide so that 12 px letters are 12 px; tables keep their most telling columns.
+  CHECK(count_of(page, "<div class=\"slim\"><svg viewBox=\"0 0 376 240\"") == 3);
+  CHECK(count_of(page, "<div class=\"broad\"><svg viewBox=\"0 0 920 330\"") == 3);
+  CHECK(page.find("@media screen and (max-width:640px){.slim{display:block}.broad{display:none}") !=
+        page.npos);
+  CHECK(count_of(page, "<table class=\"stats\">") == 2);
+  // Paper: the sheet is named, nothing scrolls, heads of columns are broken rather than cut.
+  CHECK(page.find("@page{size:A4;margin:14mm}") != page.npos);
+  const std::string print = page.substr(page.find("@media print"));
+  CHECK(print.find(".wide{overflow:visible}") < print.find("</style>"));
+  CHECK(print.find("th,.words td,.words td:first-child{white-space:normal}") < print.find("</style>"));
+}
+
+TEST_CASE(
+    "labels of the axis of time never stand on each other, however wide the drawing and long the axis") {
+  const std::regex label{
+      R"re(<text class="tick" x="([0-9.]+)" y="([0-9.]+)" text-anchor="middle">([^<]+)</text>)re"};
+  for (const double width : {376.0, 920.0}) {
+    for (const auto longest : {20us, 500us, 90'000us, 9'000'000us}) {
+      tasks::Histogram h;
+      h.add(1us);
+      h.add(longest);
+      LogPlot plot{.series = {{"ours, with fit and recorder busy", h}, {"cyclictest, alone", h}},
+                   .label = "latency"};
+      plot.width_px = width;
+      const std::string svg = log_plot(plot);
+      std::vector<std::pair<double, double>> spans;  // on the axis
+      for (std::sregex_iterator it{svg.begin(), svg.end(), label}, end; it != end; ++it) {
+        if (std::stod((*it)[2]) != 330 - 46 + 16) continue;
+        const double half = 0.5 * 7.2 * static_cast<double>((*it)[3].length());
+        spans.emplace_back(std::stod((*it)[1]) - half, std::stod((*it)[1]) + half);
+      }
+      CHECK(spans.size() >= 2);
+      for (std::size_t i = 1; i < spans.size(); ++i) CHECK(spans[i - 1].second < spans[i].first);
+      CHECK(spans.back().second <= width + 8);
+      // Names of the series stand inside as well: in a narrow drawing the second goes below the first.
+      const auto first = svg.find("y=\"15.0\">ours"),
+                 second = svg.find(width > 500 ? "y=\"15.0\">cyc" : "y=\"33.0\">cyc");
+      CHECK(first != svg.npos);
+      CHECK(second != svg.npos);
+    }
+  }
 }
 
 TEST_CASE("one value among a hundred thousand stands clear of the axis, in its place") {

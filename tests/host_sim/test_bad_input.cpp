@@ -213,13 +213,22 @@ TEST_CASE("a latency self-test that cannot be is refused in one line before anyt
     check_refused(run_program(words), "moldloft latency: " + line);
     CHECK_FALSE(fs::exists(out));
   };
-  const std::string shortest = std::to_string(firmware_like::shortest_tick / 1us);
-  refuses({"--duration", "0"}, "--duration: 0 s given; from 1 to 2592000 s");
-  refuses({"--duration", "nan"}, "--duration: nan s given; from 1 to 2592000 s");
+  const auto tick = [](const std::string& given) {
+    return "--tick: '" + given + "' given; a whole number from " +
+           std::to_string(firmware_like::shortest_tick / 1us) +
+           " to 100000 us is wanted; moldloft latency --help explains";
+  };
+  refuses({"--duration", "0"},
+          "--duration: '0' given; a number from 1 to 2592000 s is wanted; moldloft latency --help explains");
+  refuses(
+      {"--duration", "nan"},
+      "--duration: 'nan' given; a number from 1 to 2592000 s is wanted; moldloft latency --help explains");
   refuses({"--compare", "latencytest"}, "--compare: 'latencytest' given; it knows cyclictest");
-  refuses({"--tick", "500"}, "--tick: 500 us given; from " + shortest + " to 100000 us");
-  refuses({"--tick", "100001"}, "--tick: 100001 us given; from " + shortest + " to 100000 us");
-  refuses({"--tick", "-1"}, "--tick: -1 us given; from " + shortest + " to 100000 us");
+  refuses({"--tick", "500"}, tick("500"));
+  refuses({"--tick", "100001"}, tick("100001"));
+  refuses({"--tick", "-1"}, tick("-1"));
+  refuses({"--tick", "0"}, tick("0"));
+  refuses({"--tick", "1e4"}, tick("1e4"));
   refuses({"--config", bench.path("none.toml")},
           bench.path("none.toml") +
               ": cannot be read: No such file or directory; give the path of a cell configuration");
@@ -246,4 +255,50 @@ TEST_CASE("a report of what is no run, or of another version's, is refused in on
   CHECK(old.err.starts_with("moldloft report: " + bench.path("run") + ": was not written by this version"));
   CHECK(std::ranges::count(old.err, '\n') == 1);
   CHECK_FALSE(fs::exists(bench.path("run/report.html")));
+}
+
+TEST_CASE(
+    "a number that is none, or beyond its limits, is refused in one line with option, value and limits") {
+  const Workbench bench;
+  const auto refuses = [&](std::vector<std::string> words, const std::string& limits) {
+    const std::string option = words[words.size() - 2], value = words.back();
+    const std::string command = words[1] == "replay" ? "moldloft replay" : "moldloft-sim " + words[1];
+    CAPTURE(option);
+    CAPTURE(value);
+    check_refused(run_program(words), command + ": " + option + ": '" + value + "' given; " + limits + "; " +
+                                          command + " --help explains");
+  };
+  const auto cell = [&](const std::string& option, const std::string& value, const std::string& limits) {
+    for (const char* command : {"cell", "devices", "day", "judge"})
+      refuses({MOLDLOFT_SIM, command, option, value}, limits + " is wanted");
+  };
+  cell("--seed", "-1", "a whole number from 0 to 18446744073709551615");
+  cell("--seed", "18446744073709551616", "a whole number from 0 to 18446744073709551615");
+  cell("--seed", "1.5", "a whole number from 0 to 18446744073709551615");
+  cell("--seed", "", "a whole number from 0 to 18446744073709551615");
+  cell("--width", "-5", "a number from 1 to 10000 mm");
+  cell("--depth", "0", "a number from 1 to 10000 mm");
+  cell("--top-width", "1e300", "a number from 1 to 10000 mm");
+  cell("--shear", "inf", "a number from -10000 to 10000 mm");
+  cell("--thickness", "nan", "a number from 0.5 to 200 mm");
+  cell("--thickness", "0", "a number from 0.5 to 200 mm");
+  cell("--thickness", "6mm", "a number from 0.5 to 200 mm");
+  cell("--thickness", "6,0", "a number from 0.5 to 200 mm");
+  cell("--amplitude", "nan", "a number from -500 to 500 mm");
+  cell("--radius", "0", "a number from 1 to 1000000 mm");
+  refuses({MOLDLOFT_SIM, "devices", "--scanner-port", "70000"}, "a whole number from 0 to 65535 is wanted");
+  refuses({MOLDLOFT_SIM, "devices", "--scanner-port", "-1"}, "a whole number from 0 to 65535 is wanted");
+  refuses({MOLDLOFT_SIM, "day", "--hours", "inf"}, "a number from 0.01 to 10000 h is wanted");
+  refuses({MOLDLOFT_SIM, "day", "--every", "nan"}, "a number from 0 to 86400 s is wanted");
+  refuses({MOLDLOFT_SIM, "day", "--rows", "0"}, "a whole number from 1 to 1000 is wanted");
+  refuses({MOLDLOFT, "replay", bench.path("run"), "--ticks", "0"},
+          "a whole number from 1 to 1000000 is wanted");
+  const std::string seeds = "A..B or A is wanted, whole numbers from 0 on, the smaller first, 10000 at most";
+  for (const char* wrong :
+       {"3..1", "a..b", "1..", "..3", "1..1000000000000", "-1", "1...3", "0..18446744073709551615"})
+    refuses({MOLDLOFT_SIM, "campaign", "--seeds", wrong}, seeds);
+  refuses({MOLDLOFT_SIM, "campaign", "--plates", "cube"},
+          "all, or one of flat, cylinder, saddle, twist, dome, wave is wanted");
+  refuses({MOLDLOFT_SIM, "campaign", "--outlines", "round"},
+          "all, or one of square, rectangle, trapezoid, parallelogram is wanted");
 }

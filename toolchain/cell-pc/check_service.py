@@ -29,12 +29,14 @@ PROMISED = [  # what is tried, the fact, what it must be
     ("after a standstill: held", "standstill_state", "Held"),
     ("after a standstill: motions before somebody says unhold", "standstill_motions_while_held", "0"),
     ("finished: the folder is the service's own", "end_folder", "moldloft 750"),
+    ("held by an operator: the journal has it as a warning", "hold_journal", "1"),
     ("removed: prerm", "prerm", "0"),
     ("removed: the service", "prerm_active", "inactive"),
     ("a wrong configuration: start is refused", "wrong_start", "1"),
     ("a wrong configuration: the service", "wrong_active", "failed"),
     ("a wrong configuration: restarts", "wrong_restarts", "0"),
     ("a wrong configuration: exit code", "wrong_status", "1"),
+    ("a wrong configuration: the journal has it as an error", "wrong_journal", "1"),
 ]
 
 NO_CAPABILITIES = "0000000000000000"
