@@ -8,6 +8,8 @@ set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
 set(CMAKE_LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
 
+include(${CMAKE_CURRENT_LIST_DIR}/deployed.cmake)
+
 add_library(moldloft_build_options INTERFACE)
 target_compile_options(moldloft_build_options INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wnon-virtual-dtor;-Woverloaded-virtual>
@@ -31,4 +33,15 @@ function(moldloft_room name)
   # A function that is marked as non-blocking and calls what may wait or allocate is an error in every room.
   target_compile_options(moldloft_${name} PRIVATE
     $<$<AND:$<COMPILE_LANG_AND_ID:CXX,Clang>,$<VERSION_GREATER_EQUAL:$<CXX_COMPILER_VERSION>,20>>:-Werror=function-effects>)
+endfunction()
+
+# moldloft_together(ROOM NAME FILES...): what is deployed compiles these files of a room as one, because most of the time goes into
+# the headers that they share (Eigen, JSON, command line). Names that only one of them knows must then differ. Every other
+# preset compiles each file alone, and so shows that it stands alone; a file that is named nowhere always does.
+function(moldloft_together room name)
+  if(NOT CMAKE_BUILD_TYPE STREQUAL "Release")
+    return()
+  endif()
+  set_source_files_properties(${ARGN} PROPERTIES UNITY_GROUP ${name})
+  set_target_properties(moldloft_${room} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
 endfunction()

@@ -61,6 +61,19 @@ done
 dpkg-deb -f "$simulation" Depends | grep -q "^moldloft (= $(dpkg-deb -f "$package" Version))" || fail "the simulation would stand beside another controller"
 for script in postinst prerm postrm; do dpkg-deb -I "$package" $script | sh -n; done
 
+# Hardened as the distribution's own programs are: position-independent, linked before main(), the stack neither executable nor
+# unguarded, copies checked.
+if grep -q '^CMAKE_BUILD_TYPE:STRING=Release' "$build/CMakeCache.txt"; then
+  for program in bin/moldloft bin/moldloft-sim; do
+    said=$(LC_ALL=C readelf -hdlW --dyn-syms "$root/usr/$program")
+    for sign in 'Flags: NOW PIE' GNU_RELRO 'GNU_STACK .* RW ' __stack_chk_fail '__[a-z]*_chk@'; do
+      grep -q "$sign" <<<"$said" || fail "$program lacks $sign"
+    done
+  done
+  # Neither the folder in which it was built nor whose it was.
+  ! grep -rlF "$source" "$root/usr/bin" "$root/usr/lib/moldloft" || fail "a program tells where it was built"
+fi
+
 # 10 is wide open, 0 is shut; what is left are the network, the ports and the scheduling class, which the cell needs.
 cp -rn /usr/lib/systemd/system/. "$root/usr/lib/systemd/system/"  # the units that ours leans on
 said=$(systemd-analyze --root="$root" --man=no verify "moldloft@plate.service" 2>&1) || fail "systemd does not take the unit: $said"
