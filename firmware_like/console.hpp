@@ -29,8 +29,8 @@ std::uint64_t unsaid() noexcept;  // texts that were not, or not wholly, written
 // A command's answer on standard output. Nothing is lost silently: end_of_output() tells.
 void show(std::string_view text) noexcept;
 void flush_shown() noexcept;  // for who watches while it is written
-// The same with a limit, for a program that has to come to its end whoever reads. True when it was written; if not, it is
-// the caller's to tell, and no failure of the command.
+// The same with a limit, for a program that has to come to its end whoever reads. True when it was written; if not, it
+// is the caller's to tell, and no failure of the command.
 bool show_within(hal::Duration limit, std::string_view text) noexcept;
 
 // The exit code of a command that has shown its answer: 1, and a line that says why, when it could not be written.

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "firmware_like/drivers.hpp"
+#include "hal/robot_line.hpp"
 #include "tasks/motion_guard.hpp"
 
 namespace moldloft::firmware_like {
@@ -86,8 +87,8 @@ class ScannerCheck {
 
 class RobotCheck {
  public:
-  RobotCheck(const CellConfig& config, hal::ByteLink& link)
-      : config_{config}, driver_{make_robot(config.robot, link)} {}
+  RobotCheck(const CellConfig& config, hal::ByteLink& link, std::uint32_t nonce)
+      : config_{config}, driver_{make_robot(config.robot, link, nonce)} {}
 
   void start(hal::Instant now) { driver_->start(now); }
   bool is_over() const { return over_; }
@@ -133,7 +134,8 @@ class RobotCheck {
 DeviceReports try_devices(const CellConfig& config, hal::Clock& clock, hal::ByteLink& scanner_link,
                           hal::ByteLink& robot_link, std::uint32_t shot_id) {
   ScannerCheck scanner{config, scanner_link, shot_id};
-  RobotCheck robot{config, robot_link};
+  // As fresh as the shot: what the arm answers to a greeting of before is not taken for an answer to this one.
+  RobotCheck robot{config, robot_link, shot_id & hal::robot_line::largest_nonce};
   const hal::Instant begin = clock.now(), end = begin + config.device_timeout;
   scanner.start(begin);
   robot.start(begin);

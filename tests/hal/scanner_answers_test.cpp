@@ -1,5 +1,5 @@
-// A scanner that somebody has written from PROTOCOLS.md and that is there, but not as it should be: what the driver says
-// names it.
+// A scanner that somebody has written from PROTOCOLS.md and that is there, but not as it should be: what the driver
+// says names it.
 #include <doctest/doctest.h>
 
 #include <algorithm>
