@@ -32,12 +32,6 @@ double smaller_field(const CellConfig& c) { return std::min(c.scanner.field_x_mm
 // No table at all is written as a table far below.
 bool has_table(const CellConfig& c) { return c.plate.table_z_mm > -500; }
 
-MaybeFinding cell_name(const CellConfig& c) {
-  if (c.name.empty()) return {};
-  const auto name = one_line(c.name, "[cell] name", longest_plate_name);
-  return name ? std::nullopt : error({"cell.name"}, name.error());
-}
-
 MaybeFinding host(const CellConfig& c) {
   const std::string& h = c.scanner.host;
   const auto no = [](const std::string& why) { return error({"scanner.host"}, "[scanner] host: " + why); };
@@ -285,28 +279,12 @@ MaybeFinding noise(const CellConfig& c) {
 
 std::vector<ConfigFinding> contradictions(const CellConfig& c) {
   std::vector<ConfigFinding> found;
-  for (const auto rule : {cell_name,
-                          host,
-                          device,
-                          baud,
-                          speed,
-                          seek_over_step_limit,
-                          reach,
-                          start_place,
-                          start_height,
-                          mount_in_metres,
-                          mount_in_radians,
-                          scan_overlap,
-                          tracking_overlap,
-                          shots,
-                          largest_plate,
-                          step_across_the_plate,
-                          seek_step,
-                          seek_limit,
-                          scan_margin,
-                          tolerance,
-                          finest_span,
-                          noise}) {
+  for (const auto rule :
+       {host,         device,           baud,         speed,           seek_over_step_limit,
+        reach,        start_place,      start_height, mount_in_metres, mount_in_radians,
+        scan_overlap, tracking_overlap, shots,        largest_plate,   step_across_the_plate,
+        seek_step,    seek_limit,       scan_margin,  tolerance,       finest_span,
+        noise}) {
     MaybeFinding finding = rule(c);
     if (!finding) continue;
     for (const auto& key : finding->keys) {

@@ -248,7 +248,7 @@ int measure_latency(const LatencyOptions& options) {
   // Ctrl-C ends the measurement; what was measured so far is reported.
   const StopSignals signals;
   const auto config = config_of(options);
-  if (!config) return refuse(config.error().what);
+  if (!config) return complain_all(config.error().what, "moldloft latency");
   auto place = Workplace::make(options.out);
   if (!place) return refuse(place.error().what);
   auto folder = create_run(place->path(), config->text, RunKind::measured);

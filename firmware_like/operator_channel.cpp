@@ -247,7 +247,7 @@ int tell_cell(const TellOptions& options) {
   const std::string word = plain_word(options.word);
   if (word != "status" && !command_named(word))
     return complain(
-        fmt::format("'{}' is no word that a cell knows; known: {}", options.word, operator_words()));
+        fmt::format("'{}' is no word that a cell knows; known: {}", hal::printable(options.word), operator_words()));
   const auto path = options.control.empty() ? running_cell(options.cells)
                                             : std::expected<std::string, std::string>{options.control};
   if (!path) return complain(path.error());

@@ -151,14 +151,18 @@ std::expected<RunNames, std::string> names_given(const RunOptions& options) {
 }  // namespace
 
 int complain(std::string_view what, std::string_view program, Priority priority) {
-  // Several errors of a configuration stand on a line each.
+  say(marked(priority, fmt::format("{}: {}\n", program, hal::printable(what))));
+  return exit_failed;
+}
+
+int complain_all(std::string_view what, std::string_view program) {
   std::string lines;
   for (std::size_t begin = 0; begin <= what.size();) {
     const std::size_t end = std::min(what.find('\n', begin), what.size());
     lines += (begin == 0 ? "" : "\n") + hal::printable(what.substr(begin, end - begin));
     begin = end + 1;
   }
-  say(marked(priority, fmt::format("{}: {}\n", program, lines)));
+  say(marked(Priority::error, fmt::format("{}: {}\n", program, lines)));
   return exit_failed;
 }
 
@@ -297,7 +301,7 @@ int wind_up(Controller& controller, RunFolder folder, const RunOptions& options,
 
 int run_cell(const RunOptions& options) {
   const auto config = load_config(options.config_path);
-  if (!config) return complain(config.error().what);
+  if (!config) return complain_all(config.error().what);
   if (const auto why = contradiction_in(options)) return complain(*why);
   const auto names = names_given(options);
   if (!names) return complain(names.error());
@@ -376,7 +380,7 @@ int fit_run(const FitOptions& options) {
   const auto text = run->store->meta("config");
   if (!text) return complain(text.error().what);
   const auto config = parse_config(*text, options.run + "/run.db");
-  if (!config) return complain(config.error().what);
+  if (!config) return complain_all(config.error().what);
 
   hal::VirtualClock clock;
   hal::Cable none{clock, {}};  // no devices: nothing is ever sent

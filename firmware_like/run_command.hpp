@@ -21,6 +21,8 @@ enum ExitCode : int {
 
 // The one line that a failure is, on standard error; the exit code that goes with it.
 int complain(std::string_view what, std::string_view program = "moldloft", Priority = Priority::error);
+// The same for what has several lines, such as all errors of a configuration; each is made printable.
+int complain_all(std::string_view lines, std::string_view program = "moldloft");
 
 struct RunOptions {
   std::string config_path;

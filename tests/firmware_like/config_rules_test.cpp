@@ -130,7 +130,8 @@ TEST_CASE("all errors of a file are told, each with its line, in the order of th
       refusal(
           "[robot]\nbaud = 1\nbuad = 2\n[scanner]\nport = 0\nhost = \"a:1\"\n[plate]\nthickness_mm = -1\n") ==
       "cell.toml:2: [robot] baud: 1 is outside 1200 to 921600\n"
-      "cell.toml:3: [robot] buad: unknown key; known here: baud, device, driver, repeatability_z_mm, "
+      "cell.toml:3: [robot] buad: unknown key; known here: arrival_deg, arrival_mm, baud, device, driver, "
+            "repeatability_z_mm, "
       "speed_percent, workspace\n"
       "cell.toml:5: [scanner] port: 0 is outside 1 to 65535\n"
       "cell.toml:6: [scanner] host: 'a:1' has a port in it; write the address alone, and the port into port\n"
@@ -171,12 +172,6 @@ TEST_CASE("a file in another encoding is told so with the line") {
             "d\"\n",
             "error 2 byte 0xFC is not UTF-8"));
   CHECK(alone(std::string("\xFF\xFE[\0c\0", 6), "error 1 is UTF-16; save the file as UTF-8"));
-}
-
-TEST_CASE("a cell's name is one line, since it stands in every result") {
-  CHECK(alone("[cell]\nname = \"two\\nlines\"\n", "error 2 [cell] name: character 4 is a control character"));
-  CHECK(alone("[cell]\nname = \"" + std::string(200, 'n') + "\"\n", "error 2 [cell] name: 200 characters"));
-  CHECK(told("[cell]\nname = \"\"\n").empty());
 }
 
 TEST_CASE("a directory, a missing file and what never ends are told apart") {

@@ -464,7 +464,7 @@ TEST_CASE(
         psc1::Type::error);
   }
   REQUIRE(cell.run_until(Kind::shot_failed));
-  CHECK(cell.events.back().text.view() == "scanner: laser too warm (status 5)");
+  CHECK(cell.events.back().text.view() == "scanner: laser too warm (SENSOR_FAULT, status 5)");
   cell.peer.reply(psc1::ErrorReply{.status = psc1::Status::bad_state}, psc1::Type::error);
   REQUIRE(cell.run_until(Kind::ready));
   CHECK(cell.peer.hellos == 2);

@@ -2,6 +2,7 @@
 // what to do, an exit code that is not 0, nothing on standard output, and nothing left behind that would
 // block the next try.
 #include <doctest/doctest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
@@ -26,7 +27,8 @@ class Workbench {
     std::ofstream{path(name)} << text;
     return path(name);
   }
-  // cell.example.toml with one line replaced, told by its beginning.
+  // cell.example.toml with one line replaced, told by its beginning. Tests run side by side, and one controller holds a
+  // device: each has its own.
   std::string example(const std::string& begins, const std::string& line) const {
     std::ifstream file{MOLDLOFT_SOURCE_DIR "/firmware_like/cell.example.toml"};
     std::string text;
@@ -34,6 +36,8 @@ class Workbench {
     for (std::string old; std::getline(file, old);) {
       const bool is_it = !begins.empty() && old.starts_with(begins);
       found = found || is_it;
+      if (!is_it && old == "device = \"/dev/ttyS0\"") old = "device = \"" + path("arm") + "\"";
+      if (!is_it && old.starts_with("port = ")) old = "port = " + std::to_string(20000 + ::getpid() % 20000);
       text += (is_it ? line : old) + "\n";
     }
     REQUIRE((found || begins.empty()));
@@ -81,7 +85,7 @@ TEST_CASE("no scanner server: one line after the configured time, and the folder
   const Workbench bench;
   // Port 1 is nobody's on a machine that runs tests.
   const std::string config =
-      bench.write("cell.toml", "[cell]\ndevice_timeout_s = 0.5\n[scanner]\nport = 1\n");
+      bench.write("cell.toml", "[cell]\ndevice_timeout_s = 0.5\n[scanner]\nport = 1\n[robot]\ndevice = \"" + bench.path("arm") + "\"\n");
   for (int attempt = 0; attempt < 2; ++attempt) {
     check_refused(
         run_program({MOLDLOFT, "run", config, "--out", bench.path("run")}),
@@ -112,7 +116,7 @@ TEST_CASE("no serial device: one line that names the device") {
 
 TEST_CASE("ctrl-C before the arm has moved ends at once and leaves nothing behind") {
   const Workbench bench;
-  const std::string config = bench.write("cell.toml", "[scanner]\nport = 1\n");
+  const std::string config = bench.write("cell.toml", "[scanner]\nport = 2\n[robot]\ndevice = \"" + bench.path("arm") + "\"\n");
   ChildProcess run{{MOLDLOFT, "run", config, "--out", bench.path("run")}};
   hal::SteadyClock clock;
   while (!fs::exists(bench.path("run/run.db")) && clock.now() < 20s) clock.sleep_until(clock.now() + 5ms);
@@ -140,6 +144,10 @@ TEST_CASE("a folder that holds a run is never overwritten, and resumed only with
   const std::string run = bench.path("run"), config = bench.example("", "");
   REQUIRE(run_program({MOLDLOFT_SIM, "cell", "--out", run}).exit_code == 0);
   const auto size = fs::file_size(run + "/run.db");
+  const Finished complete = run_program({MOLDLOFT, "run", config, "--out", run, "--resume"});
+  CHECK(complete.exit_code == firmware_like::exit_done);
+  CHECK(complete.err.starts_with("moldloft: " + run + ": this run is complete, nothing is left to measure"));
+  fs::remove(run + "/summary.json");  // as a run is left that was broken off
   check_refused(
       run_program({MOLDLOFT, "run", config, "--out", run}),
       "moldloft: " + run + ": holds a run already; give another --out, or --resume to go on with it");

@@ -148,7 +148,7 @@ TEST_CASE("check --connect on the real links names both missing devices, and mov
   CHECK(holds(devices.out(), "ended: 0 motions, 1 exposures"));
 
   std::ofstream{config}
-      << "[cell]\ndevice_timeout_s = 0.5\n[scanner]\nport = 1\n[robot]\ndevice = \"/dev/null\"\n";
+      << "[cell]\ndevice_timeout_s = 0.5\n[scanner]\nport = 3\n[robot]\ndevice = \"/dev/null\"\n";
   ChildProcess missing{{MOLDLOFT, "check", config, "--connect"}, PTY_MODEM};
   CHECK(missing.wait(60s) == firmware_like::exit_failed);
   CHECK(holds(missing.err(), "scanner (127.0.0.1:1): 127.0.0.1:1: Connection refused"));

@@ -1,5 +1,6 @@
 // What the deployed program says on standard error: to a terminal's user, to a file, to the system's journal.
 #include <doctest/doctest.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <nlohmann/json.hpp>
@@ -32,12 +33,14 @@ std::vector<std::string> lines_of(const std::string& text) {
 // A held service whose scanner nobody serves, as `words_of` starts it.
 struct Service {
   hal::TemporaryFolder folder;
+  // Tests run side by side, and one controller holds a device: each has its own.
+  std::string port = std::to_string(40000 + ::getpid() % 20000), device = folder.file("arm");
   std::string control = folder.file("control"), out = folder.file("run"), config = folder.file("cell.toml");
   std::optional<ChildProcess> program;
 
   explicit Service(bool journal, const std::vector<std::string>& more = {}) {
     std::ofstream{config}
-        << "[scanner]\nhost = \"127.0.0.1\"\nport = 1\n[robot]\ndevice = \"/dev/ttyNONE\"\n";
+        << "[scanner]\nhost = \"127.0.0.1\"\nport = " << 40000 + ::getpid() % 20000 << "\n[robot]\ndevice = \"" << folder.file("arm") << "\"\n";
     std::vector<std::string> words = {MOLDLOFT, "run",           config,      "--out",
                                       out,      "--resume-held", "--control", control};
     words.insert(words.end(), more.begin(), more.end());
@@ -87,8 +90,8 @@ TEST_CASE("what a cell waits for is said while it waits: an operator, then the s
   CHECK(service.status().find("waiting for an operator: moldloft tell unhold, or stop") != std::string::npos);
   CHECK(service.program->prints("waiting for an operator: moldloft tell unhold, or stop", 10s));
   CHECK(service.tell("unhold").out == "done: Held -> Starting\n");
-  CHECK(service.program->prints("and the scanner: 127.0.0.1:1", 10s));
-  CHECK(service.program->prints("waiting for the robot at /dev/ttyNONE", 10s));
+  CHECK(service.program->prints("and the scanner: 127.0.0.1:" + service.port, 10s));
+  CHECK(service.program->prints("waiting for the robot at " + service.device, 10s));
   service.ended();
 }
 
