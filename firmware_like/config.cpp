@@ -341,7 +341,7 @@ std::expected<std::string, ConfigError> read_config(const std::string& path) {
   constexpr std::size_t longest = 1u << 20;  // a cell is described in a few kilobytes; a device may never end
   const auto refused = [&](std::string_view why) {
     return std::unexpected{
-        ConfigError{fmt::format("{}: {}; give the path of a cell configuration", path, why)}};
+        ConfigError{hal::printable(fmt::format("{}: {}; give the path of a cell configuration", path, why))}};
   };
   std::error_code failed;
   if (std::filesystem::is_directory(path, failed)) return refused("is a directory");

@@ -45,7 +45,7 @@ class ScannerCheck {
       driver_->unpack(driver_->packed());
       over_ = true;
       describe();
-    } else if (event.kind == Kind::shot_failed) {
+    } else if (event.kind == Kind::shot_failed || event.kind == Kind::unfit) {
       over_ = true;
       report_.text = std::string{event.text.view()};
     }

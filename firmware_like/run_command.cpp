@@ -166,6 +166,24 @@ int complain_all(std::string_view what, std::string_view program) {
   return exit_failed;
 }
 
+namespace {
+
+// Several errors of a configuration stand on a line each; only the first begins with the program's name.
+int complain_of(const ConfigError& error) {
+  std::string_view rest = error.what;
+  const std::size_t first = std::min(rest.find('\n'), rest.size());
+  complain(rest.substr(0, first));
+  for (rest.remove_prefix(first); !rest.empty();) {
+    rest.remove_prefix(1);
+    const std::size_t end = std::min(rest.find('\n'), rest.size());
+    say(marked(Priority::error, hal::printable(rest.substr(0, end)) + "\n"));
+    rest.remove_prefix(end);
+  }
+  return exit_failed;
+}
+
+}  // namespace
+
 int exit_code(const Controller& controller) {
   switch (controller.cell().state()) {
     case tasks::CellState::complete:
@@ -287,10 +305,9 @@ int wind_up(Controller& controller, RunFolder folder, const RunOptions& options,
     complain(how_it_ended(controller, options, folder.path.string()), "moldloft", priority_of(code));
   if (!written) return exit_failed;
   if (code != exit_done) return code;
-  const std::string answer =
-      options.quiet ? fmt::format("complete: {}\n", folder.path.string())
-                    : result_table(summary, folder.path.string()) +
-                          timing_lines(timing_of(controller, &conditions));
+  const std::string answer = options.quiet ? fmt::format("complete: {}\n", folder.path.string())
+                                           : result_table(summary, folder.path.string()) +
+                                                 timing_lines(timing_of(controller, &conditions));
   if (!show_within(patience_with_a_reader, answer))
     complain(fmt::format("complete; the table cannot be written to standard output: moldloft report {}",
                          folder.path.string()));

@@ -14,7 +14,7 @@ namespace {
 // A device's path, a host, a name: longer than any path may be (PATH_MAX), and a message of ours still fits a screen.
 constexpr std::size_t longest_text = 4095;
 
-constexpr std::size_t longest_label = 100;  // of a name: a title still fits a page
+constexpr std::size_t longest_label = 100;  // of a name: as much as a plate may be called by
 
 // Of a key or value that stands in a message: what is wrong with it comes behind, and must be seen.
 std::string shown(std::string_view text) { return hal::printable(text, 60); }

@@ -234,10 +234,10 @@ TEST_CASE("whom the cell waits for at the start shows in its progress") {
   std::set<std::string> waits;
   cell.run([&](const SimulatedCell& c, hal::Instant now) {
     if (now < 2ms) c.robot_cable.cut();
-    if (c.controller.cell().state() == CellState::starting)
-      waits.emplace(c.controller.cell().progress().why.view());
+    const auto progress = c.controller.cell().progress();
+    if (progress.awaited == tasks::Awaited::robot) waits.emplace(progress.awaited_why.view());
   });
-  CHECK(waits.contains("robot: the cable is cut"));
+  CHECK(waits.contains("the cable is cut"));
 }
 
 TEST_CASE("a run that is complete is not resumed: one line says so, and not a byte of its folder changes") {
