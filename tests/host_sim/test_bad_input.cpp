@@ -85,7 +85,8 @@ TEST_CASE("no scanner server: one line after the configured time, and the folder
   const Workbench bench;
   // Port 1 is nobody's on a machine that runs tests.
   const std::string config =
-      bench.write("cell.toml", "[cell]\ndevice_timeout_s = 0.5\n[scanner]\nport = 1\n[robot]\ndevice = \"" + bench.path("arm") + "\"\n");
+      bench.write("cell.toml", "[cell]\ndevice_timeout_s = 0.5\n[scanner]\nport = 1\n[robot]\ndevice = \"" +
+                                   bench.path("arm") + "\"\n");
   for (int attempt = 0; attempt < 2; ++attempt) {
     check_refused(
         run_program({MOLDLOFT, "run", config, "--out", bench.path("run")}),
@@ -116,7 +117,8 @@ TEST_CASE("no serial device: one line that names the device") {
 
 TEST_CASE("ctrl-C before the arm has moved ends at once and leaves nothing behind") {
   const Workbench bench;
-  const std::string config = bench.write("cell.toml", "[scanner]\nport = 2\n[robot]\ndevice = \"" + bench.path("arm") + "\"\n");
+  const std::string config =
+      bench.write("cell.toml", "[scanner]\nport = 2\n[robot]\ndevice = \"" + bench.path("arm") + "\"\n");
   ChildProcess run{{MOLDLOFT, "run", config, "--out", bench.path("run")}};
   hal::SteadyClock clock;
   while (!fs::exists(bench.path("run/run.db")) && clock.now() < 20s) clock.sleep_until(clock.now() + 5ms);

@@ -151,7 +151,7 @@ TEST_CASE("check --connect on the real links names both missing devices, and mov
       << "[cell]\ndevice_timeout_s = 0.5\n[scanner]\nport = 3\n[robot]\ndevice = \"/dev/null\"\n";
   ChildProcess missing{{MOLDLOFT, "check", config, "--connect"}, PTY_MODEM};
   CHECK(missing.wait(60s) == firmware_like::exit_failed);
-  CHECK(holds(missing.err(), "scanner (127.0.0.1:1): 127.0.0.1:1: Connection refused"));
+  CHECK(holds(missing.err(), "scanner (127.0.0.1:3): 127.0.0.1:3: Connection refused"));
   CHECK(holds(missing.err(), config + ":6: robot (/dev/null): "));
   CHECK(missing.err().ends_with(config + ": 2 errors, 0 warnings\n"));
 }

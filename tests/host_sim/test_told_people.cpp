@@ -39,8 +39,8 @@ struct Service {
   std::optional<ChildProcess> program;
 
   explicit Service(bool journal, const std::vector<std::string>& more = {}) {
-    std::ofstream{config}
-        << "[scanner]\nhost = \"127.0.0.1\"\nport = " << 40000 + ::getpid() % 20000 << "\n[robot]\ndevice = \"" << folder.file("arm") << "\"\n";
+    std::ofstream{config} << "[scanner]\nhost = \"127.0.0.1\"\nport = " << 40000 + ::getpid() % 20000
+                          << "\n[robot]\ndevice = \"" << folder.file("arm") << "\"\n";
     std::vector<std::string> words = {MOLDLOFT, "run",           config,      "--out",
                                       out,      "--resume-held", "--control", control};
     words.insert(words.end(), more.begin(), more.end());
