@@ -394,7 +394,8 @@ void LineRobot::take_line(std::string_view line, Instant now) {
 void LineRobot::garbled(std::string_view line, Flaw flaw, Instant now) {
   ++garbled_lines_;
   flaw_ = flaw;
-  shown_size_ = line.copy(shown_.data(), shown_.size());
+  shown_size_ = std::min(line.size(), shown_.size());
+  std::copy_n(line.data(), shown_size_, shown_.data());
   // SYN was answered, so the line is good: what comes now is of another form than it should have.
   if (phase_ == Phase::checking || phase_ == Phase::locating) why_ = *instead_of_lines();
   answer_due_ = std::min(answer_due_, now + settings_.garble_pause);
@@ -405,7 +406,7 @@ std::optional<Message> LineRobot::instead_of_lines() const {
   if (unread_ == 0) return std::nullopt;
   const bool no_line_end = shown_size_ == 0 || overlong_;
   const std::string_view shown =
-      no_line_end ? std::string_view{incoming_.data(), incoming_size_}.substr(0, shown_of_line)
+      no_line_end ? std::string_view{incoming_.data(), std::min<std::size_t>(incoming_size_, shown_of_line)}
                   : std::string_view{shown_.data(), shown_size_};
   return Message::format("the robot's answer cannot be read, {} ({} characters): \"{}\"",
                          no_line_end ? "it has no line end" : to_string(flaw_), unread_,

@@ -34,10 +34,18 @@ hal::Message waiting_for_scanner(std::string_view why, Duration limit) MOLDLOFT_
                               limit / 1s);
 }
 
+// The library's starts_with() has a branch that throws.
+bool begins_with(std::string_view text, std::string_view word) MOLDLOFT_NONBLOCKING {
+  return text.size() >= word.size() && std::equal(word.begin(), word.end(), text.begin());
+}
+
 // Of the device that is missing: its driver says why, and may have named it already.
 hal::Message why_not_ready(std::string_view device, std::string_view why) MOLDLOFT_NONBLOCKING {
-  const bool names_it =
-      why.starts_with(device) || (why.starts_with("the ") && why.substr(4).starts_with(device));
+  constexpr std::string_view article = "the ";
+  const std::string_view named =
+      begins_with(why, article) ? std::string_view{why.data() + article.size(), why.size() - article.size()}
+                                : why;
+  const bool names_it = begins_with(named, device);
   return names_it ? hal::Message{why} : hal::Message::format("{}: {}", device, why);
 }
 
