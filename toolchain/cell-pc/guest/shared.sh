@@ -12,7 +12,7 @@ for tty in /sys/class/tty/ttyS*; do
 done
 
 serve_devices() { # CONFIGURATION TO WRITE
-  moldloft-sim devices --scanner-port 4014 --robot-serial $robots --controller-serial $controllers --cell $1 \
+  moldloft-sim devices --scanner-port 4014 --robot-serial $robots --controller-serial $controllers --cell $1 --force \
     --log $devices >$results/devices 2>&1 &
   server=$!
   for i in $(seq 200); do
