@@ -35,7 +35,7 @@ void append_wrapped(std::string& out, std::string_view statement) {
 // A name of an instance: #12.
 struct Ref {
   int id;
-  std::string text() const { return "#" + std::to_string(id); }
+  std::string text() const { return std::string(1, '#') + std::to_string(id); }
 };
 
 std::string list(const std::vector<std::string>& items) {
@@ -58,7 +58,7 @@ class StepText {
  public:
   // Adds `entity`, such as PLANE('',#3), and returns its name.
   Ref add(const std::string& entity) {
-    append_wrapped(text_, "#" + std::to_string(++last_) + "=" + entity + ";");
+    append_wrapped(text_, Ref{++last_}.text() + "=" + entity + ";");
     return {last_};
   }
   Ref add(std::string_view type, std::initializer_list<std::string> parameters) {
@@ -188,7 +188,10 @@ std::string iso_time(const CadStamp& s) {
 std::string header(const CadLabel& label) {
   std::string text = "ISO-10303-21;\nHEADER;\n";
   std::string about = step_string(label.description);
-  for (const std::string& note : label.notes) about += "," + step_string(note);
+  for (const std::string& note : label.notes) {
+    about += ',';
+    about += step_string(note);
+  }
   append_wrapped(text, "FILE_DESCRIPTION((" + about + "),'2;1');");
   append_wrapped(text, "FILE_NAME(" + step_string(label.file_name) + ",'" + iso_time(label.stamp) + "',(" +
                            step_string(label.author) + "),(" + step_string(label.organization) + ")," +

@@ -236,7 +236,9 @@ class Correction {
     return refit();
   }
 
-  bool close_enough() const { return sum_ <= settings_.enough_mm * settings_.enough_mm * points_.size(); }
+  bool close_enough() const {
+    return sum_ <= settings_.enough_mm * settings_.enough_mm * static_cast<double>(points_.size());
+  }
 
   // Keeps a round's result. True when its gain is the third in a row that is not worth another.
   bool accept(BSplineSurface surface, std::vector<Foot> feet, double sum) {

@@ -16,7 +16,7 @@ BandedLeastSquares::BandedLeastSquares(int unknowns, int band, int right_sides)
       row_(static_cast<std::size_t>(width_)) {}
 
 void BandedLeastSquares::add(int first, std::span<const double> coefficients, std::span<const double> right) {
-  const int count = static_cast<int>(coefficients.size());
+  [[maybe_unused]] const int count = static_cast<int>(coefficients.size());  // for the assertion alone
   assert(count <= band_ && first >= 0 && first + count <= unknowns_);
   assert(static_cast<int>(right.size()) == right_sides_);
   std::fill(std::copy(coefficients.begin(), coefficients.end(), row_.begin()), row_.begin() + band_, 0.0);

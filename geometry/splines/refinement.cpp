@@ -48,7 +48,7 @@ struct Cut {
   int shared;
 };
 
-Cut cut_at(const std::vector<double>& full, int degree, double t) {
+Cut cut_at(const std::vector<double>& full, [[maybe_unused]] int degree, double t) {
   const auto [first, end] = std::ranges::equal_range(full, t);
   assert(end - first == degree && first != full.begin() && end != full.end());
   Cut cut{{full.begin(), end}, {first, full.end()}, static_cast<int>(first - full.begin()) - 1};
