@@ -70,8 +70,8 @@ set(CPACK_PACKAGE_CONTACT "Moldloft developers <moldloft@packages.invalid>")  # 
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_COMPONENTS_ALL controller simulation geometry)
-set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
-  OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+# The rights of folders are the packages' own, whatever the umask of who builds them.
+set(CPACK_PRE_BUILD_SCRIPTS ${package}/rights.cmake)
 # Refuses what would come out wrong without a word, and dates the packages by the changelog.
 set(CPACK_PROJECT_CONFIG_FILE ${package}/before_cpack.cmake)
 set(CPACK_MOLDLOFT_CHANGELOG ${package}/changelog)

@@ -7,9 +7,14 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
+# Two that begin together build one after the other: ninja does not guard its folder.
+mkdir -p build
+exec {turn}>build/run.lock
+flock --nonblock $turn || { echo "run.sh: another one builds here; waiting for it"; flock $turn; }
 toolchain/setup.sh
 cmake --preset release --log-level=WARNING >/dev/null
 cmake --build --preset release --target moldloft moldloft-sim pty_modem
+exec {turn}>&-
 
 export MOLDLOFT_PROGRAMS=$PWD/build/release/bin MOLDLOFT_SHIM=$PWD/build/release/lib/libpty_modem.so
 export MOLDLOFT_REHEARSE=./toolchain/run.sh

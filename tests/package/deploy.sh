@@ -20,27 +20,62 @@ mirror=$(suites | awk -v c="$codename" '$2 == c && $3 == "main" {print $1; exit}
 proxy=$(apt-config dump Acquire::http::Proxy --format '%v' 2>/dev/null || true)
 [ -z "$proxy" ] || export http_proxy=$proxy
 
+# Every run has a folder, a lock in it and control groups of its own: two may run side by side. What a killed one left is swept
+# by the next, which knows it by the lock that nobody holds. Only the bare root is shared, and it is renamed into place whole.
 cache=$build/deploy
-root=$cache/root
 boot=
+hierarchies=(/sys/fs/cgroup /sys/fs/cgroup/systemd /sys/fs/cgroup/unified)
+remove() { # the folder of a run
+  local hierarchy
+  for hierarchy in "${hierarchies[@]}"; do
+    [ ! -d "$hierarchy/deploy-${1##*.}" ] || find "$hierarchy/deploy-${1##*.}" -depth -type d -exec rmdir {} + 2>/dev/null || true
+  done
+  rm -rf --one-file-system "$1"
+}
 end() {
   if [ -n "$boot" ]; then kill "$boot" 2>/dev/null || true; wait "$boot" 2>/dev/null || true; fi
-  rm -rf "$root"
+  remove "$run"
 }
+mkdir -p "$cache"
+exec {sweeping}>"$cache/lock"
+flock "$sweeping"
+for left in "$cache"/run.*; do
+  [ ! -d "$left" ] || ! flock --nonblock "$left" true || remove "$left"
+done
+run=$(mktemp -d "$cache/run.XXXXXX")
+exec {mine}<"$run"
+flock "$mine"
 trap end EXIT
-rm -rf "$root"
-mkdir -p "$root"
+exec {sweeping}>&-
+root=$run/root
+mkdir -m 755 "$root"
 if [ ! -f "$cache/base-$codename.tar" ]; then
   began=$SECONDS
-  debootstrap --variant=minbase --include=systemd,systemd-sysv,dbus,udev,sudo "$codename" "$root" "$mirror" >"$cache/debootstrap.log" 2>&1 ||
-    { tail -5 "$cache/debootstrap.log" >&2; cannot "debootstrap has no root to give"; }
-  tar -C "$root" -cf "$cache/base.part" . && mv "$cache/base.part" "$cache/base-$codename.tar"
+  # What it mounts ends with it, also when it is killed.
+  unshare --mount debootstrap --variant=minbase --include=systemd,systemd-sysv,dbus,udev,sudo "$codename" "$root" "$mirror" \
+    >"$cache/debootstrap.log" 2>&1 || { tail -5 "$cache/debootstrap.log" >&2; cannot "debootstrap has no root to give"; }
+  tar -C "$root" -cf "$run/base.tar" . && mv "$run/base.tar" "$cache/base-$codename.tar"
   echo "deploy: debootstrap took $((SECONDS - began)) s"
 else
   tar -C "$root" -xf "$cache/base-$codename.tar"
 fi
-systemd-nspawn -q --register=no --keep-unit -D "$root" --pipe true 2>"$cache/nspawn.log" ||
-  { cat "$cache/nspawn.log" >&2; cannot "systemd-nspawn does not work here"; }
+
+# nspawn [OPTIONS]: the root as a container, which dies with this script. Where systemd runs it gives the container a scope; else
+# it has control groups of its own, because two systemd in one group would end each other's processes.
+nspawn() {
+  local hierarchy keep=(--keep-unit)
+  if [ -d /run/systemd/system ]; then
+    keep=()
+  else
+    for hierarchy in "${hierarchies[@]}"; do
+      [ -w "$hierarchy/cgroup.procs" ] || continue
+      mkdir -p "$hierarchy/deploy-${run##*.}" && echo "$BASHPID" >"$hierarchy/deploy-${run##*.}/cgroup.procs" || true
+    done
+  fi
+  exec setpriv --pdeathsig TERM timeout -k 10 1500 setpriv --pdeathsig KILL systemd-nspawn -q --register=no "${keep[@]}" \
+    --machine="deploy-${run##*.}" -D "$root" "$@"
+}
+(nspawn --pipe true) 2>"$run/nspawn.log" || { cat "$run/nspawn.log" >&2; cannot "systemd-nspawn does not work here"; }
 suites | awk '{print "deb [check-valid-until=no] " $1 " " $2 " " $3}' >"$root/etc/apt/sources.list"
 apt-config dump | grep -E '^Acquire::(http|https)::|^Acquire::Check-' >"$root/etc/apt/apt.conf.d/90host" || true
 
@@ -82,26 +117,25 @@ StandardError=file:/deploy.log
 WantedBy=default.target
 UNIT
 ln -s ../deploy.service "$root/etc/systemd/system/multi-user.target.wants/deploy.service"
-timeout 1500 systemd-nspawn -q --register=no --keep-unit -D "$root" --hostname=cell --resolv-conf=copy-host "${binds[@]}" --boot --console=read-only \
-  </dev/null >"$cache/boot.log" 2>&1 &
+nspawn --hostname=cell --resolv-conf=copy-host "${binds[@]}" --boot --console=read-only </dev/null >"$run/boot.log" 2>&1 &
 boot=$!
 wait $boot || true
 boot=
-cp "$root/deploy.log" "$cache/deploy.log" 2>/dev/null || { tail -20 "$cache/boot.log" >&2; fail "the root did not boot"; }
-grep '^deploy:' "$cache/deploy.log" || true
-grep -qx 'deploy: done' "$cache/deploy.log" || { tail -30 "$cache/deploy.log" >&2; fail "see $cache/deploy.log"; }
+cp "$run/boot.log" "$cache/"
+cp "$root/deploy.log" "$cache/" 2>/dev/null || { tail -20 "$run/boot.log" >&2; fail "the root did not boot"; }
+grep '^deploy:' "$root/deploy.log" || true
+grep -qx 'deploy: done' "$root/deploy.log" || { tail -30 "$root/deploy.log" >&2; fail "see $cache/deploy.log"; }
 
 # Two builds, in two folders, by two users: the same bytes. Only of the same compiler, and of a build tree that is deployed.
 compiler() { dpkg-query "$@" -W -f='${Version}' g++-12 libc6-dev libstdc++-12-dev libeigen3-dev nlohmann-json3-dev libcli11-dev 2>/dev/null; }
 if [ -z "$committed" ]; then
   echo "deploy: not all is committed, so the packages of the two builds were not compared"
 elif grep -q -e -ffile-prefix-map "$build/compile_commands.json" && [ "$(compiler)" = "$(compiler --admindir="$root/var/lib/dpkg")" ]; then
-  rm -rf "$cache/here"
-  (cd "$build" && cpack --config CPackConfig.cmake -B "$cache/here") >/dev/null
-  for package in "$cache"/here/*.deb; do
+  (cd "$build" && cpack --config CPackConfig.cmake -B "$run/here") >/dev/null
+  for package in "$run"/here/*.deb; do
     cmp "$package" "$tree/build/release/${package##*/}" || fail "${package##*/} depends on where it was built"
   done
-  echo "deploy: built twice, in two folders: the same $(ls "$cache/here" | grep -c deb$) packages"
+  echo "deploy: built twice, in two folders: the same $(ls "$run/here" | grep -c deb$) packages"
 else
   echo "deploy: the packages were not compared: another compiler, or a build that holds its own path"
 fi

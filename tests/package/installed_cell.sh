@@ -4,12 +4,13 @@
 set -euo pipefail
 build=$1 source=$2
 . "$source/toolchain/devices.sh"
-root=$scratch/root
+root="$scratch/a root"  # a blank in a path: it is in that of the preloaded library too
 fail() { echo "package: $1" >&2; exit 1; }
 
 pack() { (cd "$build" && cpack --config CPackConfig.cmake -B "$1") >"$scratch/cpack.log" 2>&1; }
 pack "$scratch/made" || { cat "$scratch/cpack.log" >&2; exit 1; }
 pack "$scratch/again"
+(umask 077; pack "$scratch/private")
 for package in "$scratch"/made/*.deb; do
   cmp "$package" "$scratch/again/${package##*/}" || fail "packed a second time it is other bytes"
 done
@@ -49,7 +50,7 @@ holds "$geometry" usr/lib/libmoldloft_geometry.a usr/include/moldloft/geometry/f
 ! files_of "$package" | grep -E 'pty_modem|moldloft-(sim|rehearse)|\.a$|\.hpp$' || fail "the controller's package holds what is not the controller's"
 for each in "$package" "$simulation" "$geometry"; do files_of "$each"; done | LC_ALL=C sort | uniq -d | grep . && fail "two packages hold the same file"
 for each in "$package" "$simulation" "$geometry"; do
-  [ -z "$(dpkg-deb -c "$each" | awk '$1 !~ /^(drwxr-xr-x|-rw-r--r--|-rwxr-xr-x)$/ || $2 != "root/root"')" ] || fail "${each##*/}: rights depend on who built it"
+  [ -z "$({ dpkg-deb -c "$each"; dpkg-deb -c "$scratch/private/${each##*/}"; } | awk '$1 !~ /^(drwxr-xr-x|-rw-r--r--|-rwxr-xr-x)$/ || $2 != "root/root"')" ] || fail "${each##*/}: rights depend on who built it"
 done
 dpkg-deb -x "$package" "$root"
 dpkg-deb -x "$simulation" "$root"
