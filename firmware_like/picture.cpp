@@ -111,7 +111,8 @@ Layout lay_out(std::size_t panels, double head, View& view) {
           .plot_height = size.y() * view.scale};
 }
 
-// A text in lines that fit into the picture, cut between words; a word that is longer than a line is cut in itself.
+// A text in lines that fit into the picture, cut between words, and where a part of the sentence ends if one does in a
+// line's last third, so that a number does not lose its unit. A word that is longer than a line is cut in itself.
 std::vector<std::string> lines_of(std::string_view text, double height_px) {
   const auto columns = static_cast<std::size_t>((width_px - 2 * margin_px) / (letter_width * height_px));
   const auto continues = [&](std::size_t at) {
@@ -120,6 +121,12 @@ std::vector<std::string> lines_of(std::string_view text, double height_px) {
   std::vector<std::string> lines;
   while (text.size() > columns) {
     std::size_t end = text.rfind(' ', columns);
+    for (std::size_t at = end; at != std::string_view::npos && at > columns * 2 / 3;
+         at = text.rfind(' ', at - 1)) {
+      if (text[at - 1] != ',' && text[at - 1] != ';') continue;
+      end = at;
+      break;
+    }
     if (end == std::string_view::npos || end == 0) {
       for (end = columns; end > 1 && continues(end);) --end;
     }
@@ -319,8 +326,10 @@ std::string overview_svg(const OverviewInput& in) {
     }
     return svg;
   };
-  std::string body = write(in.title, title_px, " class='title'") + write(in.subtitle, letters_px, "") +
-                     write(in.about, letters_px, "");
+  // One after the other: the operands of a sum are evaluated in any order, and each moves y on.
+  std::string body = write(in.title, title_px, " class='title'");
+  body += write(in.subtitle, letters_px, "");
+  body += write(in.about, letters_px, "");
   const Layout layout = lay_out(std::max<std::size_t>(in.fields.size(), 1), y - letters_px, view);
   for (std::size_t i = 0; i < layout.panels; ++i) {
     view.left = margin_px;
@@ -335,7 +344,8 @@ std::string overview_svg(const OverviewInput& in) {
              "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {0:.0f} {1:.0f}' width='{0:.0f}' "
              "height='{1:.0f}'>\n"
              "<style>text{{font:{2}px sans-serif;fill:#111}}.title{{font-size:{3}px;font-weight:bold}}"
-             ".shot{{font-size:13px;text-anchor:middle;fill:#333}}svg{{max-width:100%;height:auto}}"
+             ".shot{{font-size:13px;text-anchor:middle;fill:#333}}svg{{display:block;margin:auto;max-width:"
+             "100%;height:auto}}"
              "@page{{size:A4;margin:12mm}}@media print{{svg{{width:100%;max-height:270mm}}}}</style>\n"
              "<rect width='100%' height='100%' fill='#fff'/>\n",
              width_px, y, letters_px, title_px) +

@@ -144,6 +144,8 @@ std::string picture(const Controller& c, const RunLabel& label, const Json& summ
                   summary["shots"]["surface"].get<int>(), summary["points"]["used"].get<std::uint64_t>(),
                   summary["cycle"]["seconds"].get<double>());
   const bool complete = c.cell().state() == tasks::CellState::complete;
+  if (const auto why = c.cell().why().view(); !complete && !why.empty())
+    in.subtitle += fmt::format("; {}", why);
   if (complete) in.surface = &c.surface().fit().surface();
   if (complete)
     in.corners = c.surface().outline().corners;

@@ -43,7 +43,8 @@ table{font-size:12px}th,td{padding:3px 4px}th,td:first-child,td.word,.words td:f
 .stats :is(th,td):is(:nth-child(3),:nth-child(7),:nth-child(9),:nth-child(10)){display:none}}
 @page{size:A4;margin:14mm}
 @media print{:root{--paper:#fff;--ink:#000;--soft:#444;--line:#bbb;--fine:#e6e6e6;--ours:#1f6fb2;--theirs:#c2571a;
---good:#1d7a46;--bad:#b3261e;--panel:#fff}body{font-size:10pt}main{max-width:none;padding:0}section{break-inside:avoid}
+--good:#1d7a46;--bad:#b3261e;--panel:#fff}body{font-size:10pt}main{max-width:none;padding:0}
+.tiles{grid-template-columns:repeat(3,1fr)}section{break-inside:avoid}
 h2{margin-top:22px;break-after:avoid}tr{break-inside:avoid}.wide{overflow:visible}table{font-size:8.5pt}
 th,td{padding:2px 4px}th,.words td,.words td:first-child{white-space:normal}.words td{overflow-wrap:anywhere}
 .s0,.tile,.verdict{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
