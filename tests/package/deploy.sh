@@ -117,6 +117,10 @@ StandardError=file:/deploy.log
 WantedBy=default.target
 UNIT
 ln -s ../deploy.service "$root/etc/systemd/system/multi-user.target.wants/deploy.service"
+# One at a time from here: the containers share this machine's network, where the claims on ports are made, and number their
+# pseudo-terminals alike.
+exec {turn}>/tmp/moldloft-deploy.lock
+flock --nonblock "$turn" || { echo "deploy: waits for another run on this machine"; flock "$turn"; }
 nspawn --hostname=cell --resolv-conf=copy-host "${binds[@]}" --boot --console=read-only </dev/null >"$run/boot.log" 2>&1 &
 boot=$!
 wait $boot || true
@@ -136,6 +140,7 @@ elif grep -q -e -ffile-prefix-map "$build/compile_commands.json" && [ "$(compile
     cmp "$package" "$tree/build/release/${package##*/}" || fail "${package##*/} depends on where it was built"
   done
   echo "deploy: built twice, in two folders: the same $(ls "$run/here" | grep -c deb$) packages"
+  [ ! -e "$root/with_ccache" ] || echo "deploy: ... of objects from one compiler cache, so only linking and packing were compared"
 else
   echo "deploy: the packages were not compared: another compiler, or a build that holds its own path"
 fi
