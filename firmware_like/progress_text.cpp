@@ -87,20 +87,19 @@ std::string cut_to(std::size_t columns, std::string_view text) {
 
 std::string awaited_text(const tasks::CellProgress& p, const Surroundings& around) {
   // What a device has come to names it by its address.
-  const auto device = [&p](std::string_view kind, std::string_view address) {
-    return p.awaited_why.empty() ? fmt::format("{} at {}", kind, address)
-                                 : fmt::format("{}: {}", kind, p.awaited_why.view());
+  const auto device = [](std::string_view kind, std::string_view address, std::string_view why) {
+    return why.empty() ? fmt::format("{} at {}", kind, address) : fmt::format("{}: {}", kind, why);
   };
   switch (p.awaited) {
     case Awaited::nothing:
       return "";
     case Awaited::scanner:
-      return "waiting for the " + device("scanner", around.scanner);
+      return "waiting for the " + device("scanner", around.scanner, p.awaited_why);
     case Awaited::robot:
-      return "waiting for the " + device("robot", around.robot);
+      return "waiting for the " + device("robot", around.robot, p.awaited_why);
     case Awaited::both:
-      return fmt::format("waiting for the robot at {} and the {}", around.robot,
-                         device("scanner", around.scanner));
+      return fmt::format("waiting for the {} and the {}", device("robot", around.robot, p.robot_why),
+                         device("scanner", around.scanner, p.awaited_why));
     case Awaited::calibration:
       return "the robot calibrates";
     case Awaited::arm_at_rest:

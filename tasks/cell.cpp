@@ -49,6 +49,11 @@ hal::Message why_not_ready(std::string_view device, std::string_view why) MOLDLO
   return names_it ? hal::Message{why} : hal::Message::format("{}: {}", device, why);
 }
 
+// A notice is read alone: who reads only that line learns which device it is about.
+hal::Message named_by(HoldCause cause, const hal::Message& why) MOLDLOFT_NONBLOCKING {
+  return cause == HoldCause::scanner ? why_not_ready("scanner", why) : why;
+}
+
 }  // namespace
 
 Cell::Cell(const CellSettings& settings, Clock& clock, hal::Scanner& scanner, hal::Robot& robot,
@@ -103,9 +108,10 @@ void Cell::apply(CellEvent event, const hal::Message& text) {
   const auto* row = find_transition(cell_transitions(), state_, event, CellContext{.begun = begun_});
   if (row == nullptr) return;
   record("cell", to_string(event), to_string(state_), to_string(row->to), text);
-  if (event == CellEvent::hold) note(Notice::Kind::hold, text);
+  if (event == CellEvent::hold) note(Notice::Kind::hold, named_by(cause_, text));
   if (event == CellEvent::abort) note(Notice::Kind::abort, text);
-  if (event == CellEvent::unhold) note(Notice::Kind::goes_on, cause_ == HoldCause::person ? "unhold" : why_);
+  if (event == CellEvent::unhold)
+    note(Notice::Kind::goes_on, cause_ == HoldCause::person ? "unhold" : named_by(cause_, why_));
   state_ = row->to;
   entered_ = now_;
   enter(row->action);
@@ -164,7 +170,7 @@ void Cell::hold(HoldCause cause, const hal::Message& why) {
     cause_ = cause;
     why_ = why;
     record("cell", "hold", to_string(state_), to_string(state_), why);
-    note(Notice::Kind::hold, why);
+    note(Notice::Kind::hold, named_by(cause, why));
   }
   if (state_ != CellState::execute && state_ != CellState::unholding) return;
   cause_ = cause;
@@ -267,7 +273,7 @@ void Cell::on_scanner(const hal::ScannerEvent& event) {
       break;
     case Kind::lost:
       record("scanner", "lost", "", "", event.text);
-      if (state_ != CellState::execute) note(Notice::Kind::warning, event.text);
+      if (state_ != CellState::execute) note(Notice::Kind::warning, why_not_ready("scanner", event.text));
       drop_look();
       hold(HoldCause::scanner, waiting_for_scanner(event.text, settings_.scanner_wait));
       break;
@@ -441,6 +447,7 @@ void Cell::publish() {
   p.awaited = awaited();
   if (p.awaited == Awaited::scanner || p.awaited == Awaited::both) p.awaited_why.assign(scanner_.why());
   if (p.awaited == Awaited::robot) p.awaited_why.assign(robot_.why());
+  if (p.awaited == Awaited::both) p.robot_why.assign(robot_.why());
   published_.set(p);
 }
 

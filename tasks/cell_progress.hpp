@@ -44,6 +44,7 @@ struct CellProgress {
   Awaited awaited = Awaited::nothing;
   hal::Message why;
   hal::Message awaited_why{};  // what the device that is waited for has last come to; may be empty
+  hal::Message robot_why{};    // the same of the robot where both are waited for
 };
 
 }  // namespace moldloft::tasks

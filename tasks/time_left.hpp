@@ -2,8 +2,9 @@
 // then the shots that are left at the pace of those before.
 //
 // The tracker walks once round a point that lies on the plate, so the angle that it has swept about that point tells
-// how much of the outline is done. The first shots say little about that; until they say more, the plate is taken for
-// a square about the start. The pace counts what was measured now: time in a hold, and shots of an earlier run, do not.
+// how much of the outline is done, and the area that it has swept with it how much of the plate. The first shots say
+// little about that; until they say more, the plate is taken for a square about the start, of a size between what the
+// first edge's distance says and what is usual. The pace counts what was measured now: time in a hold, and shots of an earlier run, do not.
 //
 // Thread       one thread
 // Blocking     never
@@ -44,14 +45,17 @@ class TimeLeft {
   bool is_planned() const MOLDLOFT_NONBLOCKING { return planned_ >= 0; }
 
  private:
-  double outline_done() const MOLDLOFT_NONBLOCKING;    // 0..1
+  double outline_done() const MOLDLOFT_NONBLOCKING;  // 0..1
+  double guessed_side() const MOLDLOFT_NONBLOCKING;  // mm
+  double in_all(double seen, double guess) const MOLDLOFT_NONBLOCKING;
+  double perimeter() const MOLDLOFT_NONBLOCKING;       // mm
   double boundary_shots() const MOLDLOFT_NONBLOCKING;  // in all, as far as one knows
   double surface_shots() const MOLDLOFT_NONBLOCKING;
 
-  double boundary_step_mm_;
+  double field_mm_;
   ScanPlanSettings scan_;
   Eigen::Vector2d on_plate_{0, 0}, first_{0, 0}, last_{0, 0};
-  double swept_ = 0, walked_mm_ = 0;
+  double swept_ = 0, swept_mm2_ = 0, walked_mm_ = 0;
   double boundary_ = 0, surface_ = 0;             // shots so far, of whatever run
   double taken_now_ = 0, surface_taken_now_ = 0;  // shots that took time
   double planned_ = -1;

@@ -76,6 +76,9 @@ TEST_CASE("whom the cell waits for is named, with what that one has come to") {
   p.awaited = tasks::Awaited::both;
   CHECK(awaited_text(p, around) ==
         "waiting for the robot at /dev/ttyS0 and the scanner: 10.0.0.2:4014: refused");
+  p.robot_why = "no carrier";
+  CHECK(awaited_text(p, around) ==
+        "waiting for the robot: no carrier and the scanner: 10.0.0.2:4014: refused");
   p.awaited = tasks::Awaited::calibration;
   CHECK(awaited_text(p, around) == "the robot calibrates");
   p.awaited = tasks::Awaited::word_unhold;

@@ -184,7 +184,11 @@ TEST_CASE("whose run it is stands under the title, in as many lines as it needs"
   auto in = input(surface, 1);
   in.about = "plate 17; cell loft; remark: a < b";
   const std::string svg = overview_svg(in);
-  check_order(Paper{svg});
+  const Paper head{svg};
+  check_order(head);
+  CHECK(head.starting_with("Moldloft run").y < head.starting_with("complete").y);
+  CHECK(head.starting_with("complete").y < head.starting_with("plate 17").y);
+  CHECK(head.starting_with("plate 17").y < head.starting_with("Shape").y);
   CHECK(svg.find("plate 17; cell loft; remark: a &lt; b<") != std::string::npos);
   in.about = "plate ";
   for (int i = 0; i < 200; ++i) in.about += "\xC3\x9F";  // two bytes a letter

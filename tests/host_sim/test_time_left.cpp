@@ -65,8 +65,6 @@ TEST_CASE("from the start of tracking on a run says how long it still takes, and
       CAPTURE(t.at_s);
       CAPTURE(t.left_s);
       CAPTURE(truth);
-      if (std::getenv("H7") != nullptr)
-        MESSAGE(tasks::to_string(t.phase) << " " << t.at_s << " left " << t.left_s << " truth " << truth);
       if (t.phase == tasks::Phase::track_boundary) {
         ++tracking;
         if (t.left_s < 0) ++unknown;
