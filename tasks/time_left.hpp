@@ -4,7 +4,8 @@
 // The tracker walks once round a point that lies on the plate, so the angle that it has swept about that point tells
 // how much of the outline is done, and the area that it has swept with it how much of the plate. The first shots say
 // little about that; until they say more, the plate is taken for a square about the start, of a size between what the
-// first edge's distance says and what is usual. The pace counts what was measured now: time in a hold, and shots of an earlier run, do not.
+// first edge's distance says and what is usual. The pace counts what was measured now: time in a hold, and shots of an
+// earlier run, do not.
 //
 // Thread       one thread
 // Blocking     never

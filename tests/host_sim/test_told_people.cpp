@@ -91,7 +91,7 @@ TEST_CASE("what a cell waits for is said while it waits: an operator, then the s
   CHECK(service.program->prints("waiting for an operator: moldloft tell unhold, or stop", 10s));
   CHECK(service.tell("unhold").out == "done: Held -> Starting\n");
   CHECK(service.program->prints("and the scanner: 127.0.0.1:" + service.port, 10s));
-  CHECK(service.program->prints("waiting for the robot at " + service.device, 10s));
+  CHECK(service.program->prints("waiting for the robot: " + service.device + " does not exist", 10s));
   service.ended();
 }
 
