@@ -77,8 +77,8 @@ std::expected<Claim, std::string> claim_address(const std::string& host, std::ui
 std::expected<Claim, std::string> claim_serial(const std::string& device) {
   struct stat port {};
   if (::stat(device.c_str(), &port) != 0 || !S_ISCHR(port.st_mode)) return Claim{};
-  // A pseudo-terminal's number is given to another one as soon as it is gone, while whoever had it may still live: there
-  // the moment of its making tells them apart. It is not asked of a real port, whose owner may change.
+  // A pseudo-terminal's number is given to another one as soon as it is gone, while whoever had it may still live:
+  // there the moment of its making tells them apart. It is not asked of a real port, whose owner may change.
   constexpr unsigned first_pseudo_terminal = 136, last_pseudo_terminal = 143;  // major numbers of Linux
   const unsigned kind = major(port.st_rdev);
   std::string name = fmt::format("serial/{}:{}", kind, minor(port.st_rdev));
