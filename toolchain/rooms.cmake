@@ -38,8 +38,9 @@ endfunction()
 # moldloft_together(ROOM NAME FILES...): what is deployed compiles these files of a room as one, because most of the time goes into
 # the headers that they share (Eigen, JSON, command line). Names that only one of them knows must then differ. Every other
 # preset compiles each file alone, and so shows that it stands alone; a file that is named nowhere always does.
+option(MOLDLOFT_TOGETHER "Compile files of a room in groups in every build type" OFF)
 function(moldloft_together room name)
-  if(NOT CMAKE_BUILD_TYPE STREQUAL "Release")
+  if(NOT CMAKE_BUILD_TYPE STREQUAL "Release" AND NOT MOLDLOFT_TOGETHER)
     return()
   endif()
   set_source_files_properties(${ARGN} PROPERTIES UNITY_GROUP ${name})
