@@ -115,6 +115,8 @@ class Start:
         code = self.ended()
         self.until(self.arm_stands, REST_SEEN_S, "the arm was left moving")
         text = self.text()
+        if self.ended_before_it_began(code):
+            return code
         if code < 0 or code > 4:
             self.faults.append(f"ended with {code}")
         if self.must_be is not None and code not in self.must_be and not self.machine_too_busy(code):
@@ -126,6 +128,12 @@ class Start:
         if not self.unread and code != 0:
             self.judge_line(code, text)
         return code
+
+    def ended_before_it_began(self, code):
+        """On a busy machine a signal can come while the program is still being loaded: nobody can take it then, and nothing
+        is there yet that could be lost."""
+        told = (-signal.SIGHUP, -signal.SIGINT, -signal.SIGTERM)
+        return code in told and not self.out.exists() and not self.device_lines("moves", "stands", "exposure")
 
     def machine_too_busy(self, code):
         """Devices or controller did not get a processor for seconds: the run ends as it should then, but not complete."""
