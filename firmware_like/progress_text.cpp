@@ -65,6 +65,21 @@ std::string_view awaited_short(const tasks::CellProgress& p, const Surroundings&
   return "";
 }
 
+// What a device has come to names it by its address, or speaks of it as "the robot ...": it is named once all the same.
+std::string awaited_device(std::string_view kind, std::string_view address, std::string_view why) {
+  if (why.empty()) return fmt::format("the {} at {}", kind, address);
+  const std::string name = fmt::format("the {}", kind);
+  if (why.starts_with(name + " ")) return fmt::format("{}, which{}", name, why.substr(name.size()));
+  return fmt::format("{}: {}", name, why);
+}
+
+std::string both_awaited(const tasks::CellProgress& p, const Surroundings& around) {
+  const std::string robot = awaited_device("robot", around.robot, p.robot_why);
+  const bool has_clause = robot.find(", which") != std::string::npos;
+  return fmt::format("waiting for {}{} and {}", robot, has_clause ? "," : "",
+                     awaited_device("scanner", around.scanner, p.awaited_why));
+}
+
 std::size_t columns_of(std::string_view text) {
   std::size_t count = 0;
   for (const char c : text) count += (static_cast<unsigned char>(c) & 0xC0u) != 0x80u ? 1 : 0;
@@ -86,20 +101,15 @@ std::string cut_to(std::size_t columns, std::string_view text) {
 }  // namespace
 
 std::string awaited_text(const tasks::CellProgress& p, const Surroundings& around) {
-  // What a device has come to names it by its address.
-  const auto device = [](std::string_view kind, std::string_view address, std::string_view why) {
-    return why.empty() ? fmt::format("{} at {}", kind, address) : fmt::format("{}: {}", kind, why);
-  };
   switch (p.awaited) {
     case Awaited::nothing:
       return "";
     case Awaited::scanner:
-      return "waiting for the " + device("scanner", around.scanner, p.awaited_why);
+      return "waiting for " + awaited_device("scanner", around.scanner, p.awaited_why);
     case Awaited::robot:
-      return "waiting for the " + device("robot", around.robot, p.awaited_why);
+      return "waiting for " + awaited_device("robot", around.robot, p.awaited_why);
     case Awaited::both:
-      return fmt::format("waiting for the {} and the {}", device("robot", around.robot, p.robot_why),
-                         device("scanner", around.scanner, p.awaited_why));
+      return both_awaited(p, around);
     case Awaited::calibration:
       return "the robot calibrates";
     case Awaited::arm_at_rest:

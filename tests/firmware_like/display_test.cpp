@@ -88,6 +88,21 @@ TEST_CASE("whom the cell waits for is named, with what that one has come to") {
   CHECK(awaited_text(p, around) == "");
 }
 
+TEST_CASE("a device whose driver speaks of it by its kind is named once") {
+  const Surroundings around{.scanner = "10.0.0.2:4014", .robot = "/dev/ttyS0", .has_operator = true};
+  CellProgress p{.state = CellState::starting, .awaited = tasks::Awaited::robot, .why = {}};
+  p.awaited_why = "the robot does not answer SYN";
+  CHECK(awaited_text(p, around) == "waiting for the robot, which does not answer SYN");
+  p.awaited = tasks::Awaited::both;
+  p.awaited_why = "the scanner does not answer HELLO";
+  p.robot_why = "the robot has been silent for 1200 ms";
+  CHECK(awaited_text(p, around) ==
+        "waiting for the robot, which has been silent for 1200 ms, and the scanner, which does not answer "
+        "HELLO");
+  p.robot_why = "the robotics lab has no power";  // another word that only begins so
+  CHECK(awaited_text(p, around).starts_with("waiting for the robot: the robotics lab"));
+}
+
 TEST_CASE("a progress line fits into any terminal, and gives up first what matters least") {
   CellProgress p{.state = CellState::execute,
                  .phase = Phase::scan_surface,
