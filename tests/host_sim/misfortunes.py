@@ -26,7 +26,7 @@ import time
 
 LONGEST_RUN_S = 150
 LONGEST_END_S = 30  # after a wish to stop: results of a small plate, on a busy machine
-TYPICAL_RUN_S = 14
+TYPICAL_RUN_S = 9  # by the arm's motions; a misfortune after the end is none
 REST_SEEN_S = 1.0  # the robot's own watchdog would stop the arm only 2 s after the controller's last line or later
 WORDS = {0: "complete", 2: "held", 3: "aborted", 4: "stopped"}
 PLATE = ["--width", "150", "--depth", "120"]
@@ -452,9 +452,8 @@ def one_start(options, number):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("moldloft")
-    parser.add_argument("sim")
-    parser.add_argument("pty_modem")
+    for program in ("moldloft", "sim", "pty_modem"):  # started from other folders, too
+        parser.add_argument(program, type=os.path.abspath)
     parser.add_argument("--starts", type=int, default=len(MISFORTUNES))
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--side-by-side", type=int, default=2)
