@@ -166,24 +166,6 @@ int complain_all(std::string_view what, std::string_view program) {
   return exit_failed;
 }
 
-namespace {
-
-// Several errors of a configuration stand on a line each; only the first begins with the program's name.
-int complain_of(const ConfigError& error) {
-  std::string_view rest = error.what;
-  const std::size_t first = std::min(rest.find('\n'), rest.size());
-  complain(rest.substr(0, first));
-  for (rest.remove_prefix(first); !rest.empty();) {
-    rest.remove_prefix(1);
-    const std::size_t end = std::min(rest.find('\n'), rest.size());
-    say(marked(Priority::error, hal::printable(rest.substr(0, end)) + "\n"));
-    rest.remove_prefix(end);
-  }
-  return exit_failed;
-}
-
-}  // namespace
-
 int exit_code(const Controller& controller) {
   switch (controller.cell().state()) {
     case tasks::CellState::complete:
@@ -274,10 +256,17 @@ RunConditions run_beside_threads(Controller& controller, const CellConfig& confi
   return conditions;
 }
 
+// Under the journal, for whoever watches it: on a terminal and in the report the timing says the same.
+void warn_of_missed_ticks(const Controller& controller, const RunConditions& conditions) {
+  const std::string line = missed_ticks_line(timing_of(controller, &conditions));
+  if (stderr_is_journal() && !line.empty()) complain(line, "moldloft", Priority::warning);
+}
+
 // What is left behind and said when the cell has come to rest.
 int wind_up(Controller& controller, RunFolder folder, const RunOptions& options, bool resumed,
             const RunConditions& conditions) {
   const int code = exit_code(controller);
+  warn_of_missed_ticks(controller, conditions);
   if (!resumed && !controller.cell().has_driven()) {
     discard_run(std::move(folder));
     return complain(why_refused(controller), "moldloft", priority_of(code)),

@@ -186,4 +186,19 @@ std::string timing_lines(const Json& t) {
          line("timing representative", result_width, verdict(t));
 }
 
+std::string missed_ticks_line(const Json& t) {
+  if (number(t, "missed_ticks") == 0) return "";
+  std::string causes;
+  for (const auto& [cause, count] : t.at("missed_by_cause").items())
+    if (const auto n = count.get<std::uint64_t>(); n > 0)
+      causes += fmt::format("{}{} {}", causes.empty() ? "" : ", ", cause, n);
+  std::string s =
+      fmt::format("{} of {} ticks were missed: {}", number(t, "missed_ticks"), number(t, "ticks"), causes);
+  if (t.at("first_misses").empty()) return s;
+  const Json& first = t.at("first_misses").front();
+  s += fmt::format("; the first at {} s, {} us late", moment_s(first, "t_ms"), figure(first.at("late_us")));
+  if (const std::string task = text(first, "task"); task != "none") s += fmt::format(", after '{}'", task);
+  return s;
+}
+
 }  // namespace moldloft::firmware_like

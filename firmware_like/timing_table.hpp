@@ -13,5 +13,7 @@ namespace moldloft::firmware_like {
 
 std::string timing_table(const Json& timing);  // everything
 std::string timing_lines(const Json& timing);  // what one wants to know at the end of a run
+// How many ticks were missed, why, and where it began; empty where none was.
+std::string missed_ticks_line(const Json& timing);
 
 }  // namespace moldloft::firmware_like

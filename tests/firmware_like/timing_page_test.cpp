@@ -434,3 +434,15 @@ TEST_CASE("the end of a run shows wake-up, misses, load and the verdict, and no 
   CHECK(numbered(lines, "wake-up latency").find("p99.9") != std::string::npos);
   CHECK(numbered(lines, "load").starts_with("load                        table 12"));
 }
+
+TEST_CASE(
+    "missed ticks make one line with count, causes and the first of them, and none where none was missed") {
+  // The tick due at 700 ms began 21 us late and took 3.3 ms: those due at 701, 702 and 703 ms were lost.
+  CHECK(missed_ticks_line(report()) ==
+        "3 of 1997 ticks were missed: computing 3; the first at 0.703 s, 2321 us late, after "
+        "'scanner <in> & \"out\"'");
+  Json none = report();
+  none["missed_ticks"] = 0;
+  none["first_misses"] = Json::array();
+  CHECK(missed_ticks_line(none) == "");
+}

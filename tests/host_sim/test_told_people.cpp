@@ -78,6 +78,29 @@ TEST_CASE("under the journal an abort comes with its reason and as an error, any
   }
 }
 
+TEST_CASE("missed ticks are one warning of the journal at the end of the run, anywhere else the table's") {
+  for (const bool journal : {true, false}) {
+    CAPTURE(journal);
+    Service service{journal};
+    // A program that is suspended cannot tick: at least 100 of its ticks are lost, whatever the machine does beside.
+    service.program->send(SIGSTOP);
+    service.program->wait(200ms);
+    service.program->send(SIGCONT);
+    CHECK(service.status().find("Held") != std::string::npos);
+    const std::string said = service.ended();
+    CAPTURE(said);
+    std::vector<std::string> told;
+    for (const auto& line : lines_of(said))
+      if (line.find("ticks were missed") != std::string::npos) told.push_back(line);
+    REQUIRE(told.size() == (journal ? 1 : 0));
+    if (!journal) continue;
+    CHECK(told[0].starts_with("<4>moldloft: "));
+    CHECK(std::stoi(told[0].substr(std::string_view{"<4>moldloft: "}.size())) >= 100);
+    CHECK(told[0].find("; the first at ") != std::string::npos);
+    CHECK(lines_of(said).back().find("ticks were missed") == std::string::npos);  // that is how to go on
+  }
+}
+
 TEST_CASE("what is wrong before anything is begun is an error of the journal too") {
   const auto refused = run_program(under_journal({MOLDLOFT, "run", "/nowhere/cell.toml"}));
   CHECK(refused.exit_code == firmware_like::exit_failed);
