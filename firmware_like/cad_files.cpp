@@ -1,11 +1,11 @@
 #include "firmware_like/cad_files.hpp"
 
+#include "geometry/cad/iges_writer.hpp"
+#include "geometry/cad/step_writer.hpp"
+
 #include <fmt/format.h>
 
 #include <cstdio>
-
-#include "geometry/cad/iges_writer.hpp"
-#include "geometry/cad/step_writer.hpp"
 
 namespace moldloft::firmware_like {
 namespace {

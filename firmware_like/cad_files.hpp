@@ -7,11 +7,11 @@
 // Failure      one line that says what is wrong with the surface
 #pragma once
 
+#include "firmware_like/surface_file.hpp"
+
 #include <expected>
 #include <optional>
 #include <string>
-
-#include "firmware_like/surface_file.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -4,11 +4,11 @@
 // Failure      one line that names the device and the process that has it
 #pragma once
 
-#include <expected>
-#include <string>
-
 #include "firmware_like/config.hpp"
 #include "hal/claim.hpp"
+
+#include <expected>
+#include <string>
 
 namespace moldloft::firmware_like {
 

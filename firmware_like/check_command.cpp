@@ -1,20 +1,7 @@
 #include "firmware_like/check_command.hpp"
+
 #include "firmware_like/cell_claim.hpp"
 #include "firmware_like/console.hpp"
-
-#include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <iterator>
-#include <memory>
-#include <new>
-#include <random>
-
 #include "firmware_like/control_thread.hpp"
 #include "firmware_like/controller.hpp"
 #include "firmware_like/device_check.hpp"
@@ -24,6 +11,19 @@
 #include "hal/serial_link.hpp"
 #include "hal/tcp_link.hpp"
 #include "tasks/tool_pose.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <new>
+#include <random>
+#include <sys/stat.h>
+#include <unistd.h>
 
 namespace moldloft::firmware_like {
 namespace {

@@ -1,5 +1,8 @@
 #include "firmware_like/command_line.hpp"
 
+#include "firmware_like/console.hpp"
+#include "firmware_like/run_command.hpp"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -8,9 +11,6 @@
 #include <string>
 #include <string_view>
 #include <vector>
-
-#include "firmware_like/console.hpp"
-#include "firmware_like/run_command.hpp"
 
 namespace moldloft::firmware_like {
 namespace {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+
 #include <optional>
 
 namespace moldloft::firmware_like {

@@ -1,5 +1,10 @@
 #include "firmware_like/config.hpp"
 
+#include "firmware_like/plate_name.hpp"
+#include "firmware_like/task_table.hpp"
+#include "firmware_like/toml_section.hpp"
+#include "hal/printable_text.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,11 +17,6 @@
 #include <numbers>
 #include <optional>
 #include <sstream>
-
-#include "firmware_like/plate_name.hpp"
-#include "firmware_like/task_table.hpp"
-#include "firmware_like/toml_section.hpp"
-#include "hal/printable_text.hpp"
 
 namespace moldloft::firmware_like {
 namespace {

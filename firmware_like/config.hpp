@@ -4,15 +4,15 @@
 // key and what is allowed, because a misspelt limit that silently keeps its default is how arms meet plates.
 #pragma once
 
-#include <expected>
-#include <map>
-#include <string>
-#include <vector>
-
 #include "firmware_like/config_rules.hpp"
 #include "firmware_like/realtime_config.hpp"
 #include "hal/psc1.hpp"
 #include "tasks/cell.hpp"
+
+#include <expected>
+#include <map>
+#include <string>
+#include <vector>
 
 namespace moldloft::firmware_like {
 
@@ -50,7 +50,7 @@ struct PlateConfig {
 };
 
 struct CellConfig {
-  std::string path, text;  // where it came from and as it stood there; kept in the run store
+  std::string path, text;                // where it came from and as it stood there; kept in the run store
   std::map<std::string, int> key_lines;  // "robot.baud" -> 12, of the keys that stand there
   std::string name = "cell";
   hal::Duration tick = std::chrono::milliseconds{1};

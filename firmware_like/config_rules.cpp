@@ -1,5 +1,11 @@
 #include "firmware_like/config_rules.hpp"
 
+#include "firmware_like/config.hpp"
+#include "firmware_like/memory_plan.hpp"
+#include "firmware_like/plate_name.hpp"
+#include "tasks/motion_guard.hpp"
+#include "tasks/tool_pose.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,12 +13,6 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-
-#include "firmware_like/config.hpp"
-#include "firmware_like/memory_plan.hpp"
-#include "firmware_like/plate_name.hpp"
-#include "tasks/motion_guard.hpp"
-#include "tasks/tool_pose.hpp"
 
 namespace moldloft::firmware_like {
 namespace {

@@ -9,10 +9,10 @@
 // Failure      say() counts it; show() keeps it for end_of_output()
 #pragma once
 
+#include "hal/clock.hpp"
+
 #include <cstdint>
 #include <string_view>
-
-#include "hal/clock.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -1,10 +1,9 @@
 #include "firmware_like/control_thread.hpp"
 
+#include <cassert>
 #include <pthread.h>
 #include <signal.h>
 #include <unistd.h>
-
-#include <cassert>
 
 namespace moldloft::firmware_like {
 

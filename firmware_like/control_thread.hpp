@@ -7,13 +7,12 @@
 // Failure      what the set-up could not have is in setup(); std::system_error when no thread can be had at all
 #pragma once
 
-#include <sys/types.h>
+#include "firmware_like/process_setup.hpp"
 
 #include <functional>
 #include <semaphore>
+#include <sys/types.h>
 #include <thread>
-
-#include "firmware_like/process_setup.hpp"
 
 namespace moldloft::firmware_like {
 

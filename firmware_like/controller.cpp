@@ -1,10 +1,10 @@
 #include "firmware_like/controller.hpp"
 
-#include <array>
-#include <utility>
-
 #include "firmware_like/drivers.hpp"
 #include "firmware_like/task_table.hpp"
+
+#include <array>
+#include <utility>
 
 namespace moldloft::firmware_like {
 namespace {

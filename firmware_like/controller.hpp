@@ -9,9 +9,6 @@
 // Failure      the constructor throws nothing; what goes wrong shows in the cell's state and why()
 #pragma once
 
-#include <atomic>
-#include <memory>
-
 #include "firmware_like/config.hpp"
 #include "firmware_like/memory_plan.hpp"
 #include "hal/flight_recorder.hpp"
@@ -22,6 +19,9 @@
 #include "hal/tapped_link.hpp"
 #include "tasks/cell.hpp"
 #include "tasks/scheduler.hpp"
+
+#include <atomic>
+#include <memory>
 
 namespace moldloft::firmware_like {
 

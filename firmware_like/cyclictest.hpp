@@ -8,14 +8,14 @@
 // Failure      one line: what is missing or wrong, what to do
 #pragma once
 
+#include "firmware_like/run_folder.hpp"
+#include "tasks/histogram.hpp"
+
 #include <cstdint>
 #include <expected>
 #include <filesystem>
 #include <string>
 #include <vector>
-
-#include "firmware_like/run_folder.hpp"
-#include "tasks/histogram.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -1,13 +1,13 @@
 #include "firmware_like/device_check.hpp"
 
+#include "firmware_like/drivers.hpp"
+#include "hal/robot_line.hpp"
+#include "tasks/motion_guard.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-
-#include "firmware_like/drivers.hpp"
-#include "hal/robot_line.hpp"
-#include "tasks/motion_guard.hpp"
 
 namespace moldloft::firmware_like {
 namespace {

@@ -7,13 +7,13 @@
 // Failure      in the reports, one line each: what the driver says
 #pragma once
 
-#include <cstdint>
-#include <string>
-#include <vector>
-
 #include "firmware_like/config.hpp"
 #include "hal/byte_link.hpp"
 #include "hal/clock.hpp"
+
+#include <cstdint>
+#include <string>
+#include <vector>
 
 namespace moldloft::firmware_like {
 

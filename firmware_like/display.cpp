@@ -1,17 +1,17 @@
 #include "firmware_like/display.hpp"
 
-#include <fmt/format.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <cstdlib>
-#include <string_view>
-
 #include "firmware_like/console.hpp"
 #include "firmware_like/journal.hpp"
 #include "firmware_like/option_values.hpp"
 #include "firmware_like/stop_signals.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <string_view>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
 namespace moldloft::firmware_like {
 namespace {
@@ -69,8 +69,7 @@ void DisplayThread::show(const tasks::CellProgress& p) {
     // The last column stays free: a line that fills it would wrap on some terminals. Asked each time, since windows are
     // resized.
     const auto columns = terminal_columns(STDERR_FILENO, std::getenv("COLUMNS"));
-    say(fmt::format("\r\x1b[K{}",
-                    progress_line_within(std::max<std::size_t>(columns, 2) - 1, p, around_)));
+    say(fmt::format("\r\x1b[K{}", progress_line_within(std::max<std::size_t>(columns, 2) - 1, p, around_)));
     return;
   }
   // A log gets a line when something has happened, not when time has passed. In the journal nothing has to stand alone.

@@ -4,14 +4,14 @@
 // why stands alone.
 #pragma once
 
+#include "firmware_like/progress_text.hpp"
+#include "hal/clock.hpp"
+#include "tasks/cell.hpp"
+
 #include <atomic>
 #include <cstddef>
 #include <string>
 #include <thread>
-
-#include "firmware_like/progress_text.hpp"
-#include "hal/clock.hpp"
-#include "tasks/cell.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -1,9 +1,9 @@
 #include "firmware_like/drivers.hpp"
 
-#include <cassert>
-
 #include "hal/line_robot.hpp"
 #include "hal/psc_scanner.hpp"
+
+#include <cassert>
 
 namespace moldloft::firmware_like {
 

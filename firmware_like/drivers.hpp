@@ -2,12 +2,12 @@
 // here.
 #pragma once
 
-#include <memory>
-
 #include "firmware_like/config.hpp"
 #include "hal/byte_link.hpp"
 #include "hal/robot.hpp"
 #include "hal/scanner.hpp"
+
+#include <memory>
 
 namespace moldloft::firmware_like {
 

@@ -8,12 +8,12 @@
 // Failure      none: what cannot be read is empty, and said to be unknown
 #pragma once
 
+#include "firmware_like/process_setup.hpp"
+
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include "firmware_like/process_setup.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -1,12 +1,12 @@
 #include "firmware_like/export_command.hpp"
 
-#include <fmt/format.h>
-
 #include "firmware_like/cad_files.hpp"
 #include "firmware_like/console.hpp"
 #include "firmware_like/run_command.hpp"
 #include "firmware_like/whole_file.hpp"
 #include "hal/printable_text.hpp"
+
+#include <fmt/format.h>
 
 namespace moldloft::firmware_like {
 namespace {

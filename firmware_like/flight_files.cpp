@@ -1,16 +1,16 @@
 #include "firmware_like/flight_files.hpp"
 
-#include <fcntl.h>
+#include "firmware_like/console.hpp"
+
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <csignal>
 #include <cstring>
-
-#include "firmware_like/console.hpp"
+#include <fcntl.h>
+#include <unistd.h>
 
 namespace moldloft::firmware_like {
 

@@ -8,10 +8,10 @@
 // Failure      a dump that cannot be written is one line on standard error, and the recorder runs on
 #pragma once
 
+#include "firmware_like/controller.hpp"
+
 #include <filesystem>
 #include <vector>
-
-#include "firmware_like/controller.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -11,9 +11,9 @@
 // Allocation   yes
 #pragma once
 
-#include <string>
-
 #include "hal/flight_dump.hpp"
+
+#include <string>
 
 namespace moldloft::firmware_like {
 

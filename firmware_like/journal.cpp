@@ -1,10 +1,10 @@
 #include "firmware_like/journal.hpp"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <cstdlib>
+#include <sys/stat.h>
+#include <unistd.h>
 
 namespace moldloft::firmware_like {
 

@@ -1,15 +1,5 @@
 #include "firmware_like/latency_command.hpp"
 
-#include <fmt/format.h>
-#include <stdlib.h>
-
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <iterator>
-#include <semaphore>
-#include <utility>
-
 #include "firmware_like/console.hpp"
 #include "firmware_like/control_thread.hpp"
 #include "firmware_like/flight_files.hpp"
@@ -23,6 +13,16 @@
 #include "firmware_like/timing_page.hpp"
 #include "firmware_like/timing_table.hpp"
 #include "hal/realtime_section.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <iterator>
+#include <semaphore>
+#include <stdlib.h>
+#include <utility>
 
 namespace moldloft::firmware_like {
 namespace {

@@ -3,11 +3,11 @@
 // cyclictest. The value returned is the program's exit code: 0 when it was measured, whatever came out.
 #pragma once
 
-#include <optional>
-#include <string>
-
 #include "firmware_like/cyclictest.hpp"
 #include "firmware_like/timing_report.hpp"
+
+#include <optional>
+#include <string>
 
 namespace moldloft::firmware_like {
 

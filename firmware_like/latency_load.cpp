@@ -1,13 +1,13 @@
 #include "firmware_like/latency_load.hpp"
 
+#include "firmware_like/memory_plan.hpp"
+#include "firmware_like/task_table.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <numbers>
 #include <random>
-
-#include "firmware_like/memory_plan.hpp"
-#include "firmware_like/task_table.hpp"
 
 namespace moldloft::firmware_like {
 namespace {

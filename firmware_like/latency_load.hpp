@@ -10,9 +10,6 @@
 // Failure      failed() when the fit has given up: a defect of the program, since the plate is known to be good
 #pragma once
 
-#include <optional>
-#include <vector>
-
 #include "firmware_like/config.hpp"
 #include "hal/flight_recorder.hpp"
 #include "hal/realtime.hpp"
@@ -20,6 +17,9 @@
 #include "hal/tapped_link.hpp"
 #include "tasks/scheduler.hpp"
 #include "tasks/surface_task.hpp"
+
+#include <optional>
+#include <vector>
 
 namespace moldloft::firmware_like {
 

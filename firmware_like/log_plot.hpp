@@ -8,12 +8,12 @@
 // Failure      none; a plot without values is empty axes
 #pragma once
 
+#include "hal/clock.hpp"
+#include "tasks/histogram.hpp"
+
 #include <string>
 #include <string_view>
 #include <vector>
-
-#include "hal/clock.hpp"
-#include "tasks/histogram.hpp"
 
 namespace moldloft::firmware_like {
 

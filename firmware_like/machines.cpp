@@ -1,15 +1,15 @@
 #include "firmware_like/machines.hpp"
 
+#include "tasks/boundary_tracker.hpp"
+#include "tasks/cell_state.hpp"
+#include "tasks/shot_sequence.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <set>
 #include <utility>
 #include <vector>
-
-#include "tasks/boundary_tracker.hpp"
-#include "tasks/cell_state.hpp"
-#include "tasks/shot_sequence.hpp"
 
 namespace moldloft::firmware_like {
 namespace {

@@ -1,10 +1,4 @@
 // The controller program.
-#include <fmt/format.h>
-
-#include <CLI/CLI.hpp>
-#include <sstream>
-#include <system_error>
-
 #include "firmware_like/build_info.hpp"
 #include "firmware_like/check_command.hpp"
 #include "firmware_like/command_line.hpp"
@@ -18,6 +12,12 @@
 #include "firmware_like/report_command.hpp"
 #include "firmware_like/run_command.hpp"
 #include "firmware_like/task_table.hpp"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <sstream>
+#include <system_error>
 
 using namespace moldloft::firmware_like;
 using namespace std::chrono_literals;

@@ -1,9 +1,9 @@
 #include "firmware_like/measured_points.hpp"
 
+#include "tasks/tool_pose.hpp"
+
 #include <algorithm>
 #include <cmath>
-
-#include "tasks/tool_pose.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -2,11 +2,11 @@
 // picture. Result time only: reads, allocates.
 #pragma once
 
-#include <vector>
-
 #include "firmware_like/controller.hpp"
 #include "firmware_like/picture.hpp"
 #include "hal/run_store.hpp"
+
+#include <vector>
 
 namespace moldloft::firmware_like {
 

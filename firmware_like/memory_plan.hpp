@@ -2,10 +2,10 @@
 // Printed and stored at start; after start the control thread takes no more.
 #pragma once
 
+#include "firmware_like/config.hpp"
+
 #include <string>
 #include <vector>
-
-#include "firmware_like/config.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -1,24 +1,24 @@
 #include "firmware_like/operator_channel.hpp"
 
+#include "firmware_like/console.hpp"
+#include "firmware_like/progress_text.hpp"
+#include "firmware_like/run_command.hpp"
+#include "hal/printable_text.hpp"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <sys/stat.h>
-#include <sys/un.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
 #include <optional>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
 #include <vector>
-
-#include "firmware_like/console.hpp"
-#include "firmware_like/progress_text.hpp"
-#include "firmware_like/run_command.hpp"
-#include "hal/printable_text.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -86,20 +86,20 @@ std::string without_line_end(std::string_view text) {
 std::string status_json(const tasks::CellProgress& p) {
   constexpr std::array<const char*, 6> causes = {"none",   "scanner", "recorder",
                                                  "person", "plan",    "measurement"};
-  return json_text(Json{
-      {"state", std::string{tasks::to_string(p.state)}},
-      {"phase", std::string{tasks::to_string(p.phase)}},
-      {"hold_cause", causes[static_cast<std::size_t>(p.cause)]},
-      {"why", std::string{p.why.view()}},
-      {"boundary_shots", p.boundary_shots},
-      {"surface_shots", p.surface_shots},
-      {"surface_planned", p.surface_planned},
-      {"retaken", p.retaken},
-      {"waiting", awaited_text(p, {.has_operator = true})},
-      {"seconds", std::chrono::duration<double>(p.now).count()},
-      {"seconds_left",
-       p.time_left < 0ns ? Json(nullptr) : Json(std::chrono::duration<double>(p.time_left).count())},
-      {"left_is_estimate", !p.left_is_planned}});
+  return json_text(
+      Json{{"state", std::string{tasks::to_string(p.state)}},
+           {"phase", std::string{tasks::to_string(p.phase)}},
+           {"hold_cause", causes[static_cast<std::size_t>(p.cause)]},
+           {"why", std::string{p.why.view()}},
+           {"boundary_shots", p.boundary_shots},
+           {"surface_shots", p.surface_shots},
+           {"surface_planned", p.surface_planned},
+           {"retaken", p.retaken},
+           {"waiting", awaited_text(p, {.has_operator = true})},
+           {"seconds", std::chrono::duration<double>(p.now).count()},
+           {"seconds_left",
+            p.time_left < 0ns ? Json(nullptr) : Json(std::chrono::duration<double>(p.time_left).count())},
+           {"left_is_estimate", !p.left_is_planned}});
 }
 
 std::string answer_to(std::string_view word, tasks::Cell& cell, const std::function<void()>& let_time_pass) {
@@ -246,8 +246,8 @@ std::expected<std::string, std::string> ask_cell(const std::string& word, const 
 int tell_cell(const TellOptions& options) {
   const std::string word = plain_word(options.word);
   if (word != "status" && !command_named(word))
-    return complain(
-        fmt::format("'{}' is no word that a cell knows; known: {}", hal::printable(options.word), operator_words()));
+    return complain(fmt::format("'{}' is no word that a cell knows; known: {}", hal::printable(options.word),
+                                operator_words()));
   const auto path = options.control.empty() ? running_cell(options.cells)
                                             : std::expected<std::string, std::string>{options.control};
   if (!path) return complain(path.error());

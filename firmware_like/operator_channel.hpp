@@ -11,16 +11,16 @@
 // Failure      one line
 #pragma once
 
+#include "firmware_like/cell_search.hpp"
+#include "hal/clock.hpp"
+#include "tasks/cell.hpp"
+
 #include <atomic>
 #include <expected>
 #include <functional>
 #include <string>
 #include <string_view>
 #include <thread>
-
-#include "firmware_like/cell_search.hpp"
-#include "hal/clock.hpp"
-#include "tasks/cell.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -6,9 +6,9 @@
 // Failure      CLI::ValidationError, which command_line.hpp words
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <charconv>
 #include <string>
 #include <type_traits>

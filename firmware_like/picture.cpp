@@ -1,14 +1,14 @@
 #include "firmware_like/picture.hpp"
 
-#include <fmt/format.h>
+#include "hal/printable_text.hpp"
 
 #include <Eigen/Dense>
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
-
-#include "hal/printable_text.hpp"
 
 namespace moldloft::firmware_like {
 namespace {

@@ -5,14 +5,14 @@
 // Set-up and result time only: allocates.
 #pragma once
 
+#include "geometry/edges/outline.hpp"
+#include "geometry/splines/bspline.hpp"
+#include "tasks/boundary_tracker.hpp"
+
 #include <functional>
 #include <span>
 #include <string>
 #include <vector>
-
-#include "geometry/splines/bspline.hpp"
-#include "geometry/edges/outline.hpp"
-#include "tasks/boundary_tracker.hpp"
 
 namespace moldloft::firmware_like {
 

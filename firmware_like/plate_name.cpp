@@ -1,9 +1,9 @@
 #include "firmware_like/plate_name.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 namespace moldloft::firmware_like {
 namespace {

@@ -1,11 +1,11 @@
 // PLY files that anyone can read: binary little-endian, the unit in a comment.
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "firmware_like/measured_points.hpp"
 #include "geometry/splines/bspline.hpp"
+
+#include <string>
+#include <vector>
 
 namespace moldloft::firmware_like {
 

@@ -1,13 +1,6 @@
 #include "firmware_like/process_setup.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <malloc.h>
-#include <pthread.h>
-#include <sched.h>
-#include <sys/mman.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -15,9 +8,16 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <fcntl.h>
 #include <filesystem>
 #include <fstream>
+#include <malloc.h>
 #include <optional>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 namespace moldloft::firmware_like {
 namespace {

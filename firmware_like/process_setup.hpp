@@ -9,13 +9,12 @@
 // Failure      none; see the rows
 #pragma once
 
-#include <sys/types.h>
+#include "firmware_like/realtime_config.hpp"
 
 #include <string>
 #include <string_view>
+#include <sys/types.h>
 #include <vector>
-
-#include "firmware_like/realtime_config.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -2,11 +2,11 @@
 // service manager, what is waited for, and what is noted. Pure functions.
 #pragma once
 
-#include <cstddef>
-#include <string>
-
 #include "tasks/cell_progress.hpp"
 #include "tasks/notice.hpp"
+
+#include <cstddef>
+#include <string>
 
 namespace moldloft::firmware_like {
 

@@ -2,13 +2,13 @@
 // recorder's dumps.
 #pragma once
 
-#include <atomic>
-#include <thread>
-
 #include "firmware_like/flight_files.hpp"
 #include "hal/clock.hpp"
 #include "hal/recorder.hpp"
 #include "hal/run_store.hpp"
+
+#include <atomic>
+#include <thread>
 
 namespace moldloft::firmware_like {
 

@@ -1,17 +1,17 @@
 #include "firmware_like/replay_command.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <vector>
-
 #include "firmware_like/console.hpp"
 #include "firmware_like/flight_files.hpp"
 #include "firmware_like/flight_timeline.hpp"
 #include "firmware_like/run_command.hpp"
 #include "firmware_like/run_folder.hpp"
 #include "hal/printable_text.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <vector>
 
 namespace moldloft::firmware_like {
 namespace {

@@ -1,13 +1,13 @@
 #include "firmware_like/report_command.hpp"
 
-#include <fmt/format.h>
-
 #include "firmware_like/console.hpp"
 #include "firmware_like/results.hpp"
 #include "firmware_like/run_command.hpp"
 #include "firmware_like/timing_page.hpp"
 #include "firmware_like/timing_table.hpp"
 #include "hal/printable_text.hpp"
+
+#include <fmt/format.h>
 
 namespace moldloft::firmware_like {
 namespace {

@@ -1,9 +1,5 @@
 #include "firmware_like/results.hpp"
 
-#include <fmt/format.h>
-
-#include <cmath>
-
 #include "firmware_like/build_info.hpp"
 #include "firmware_like/cad_files.hpp"
 #include "firmware_like/measured_points.hpp"
@@ -11,6 +7,10 @@
 #include "firmware_like/timing_page.hpp"
 #include "firmware_like/timing_report.hpp"
 #include "hal/printable_text.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
 
 namespace moldloft::firmware_like {
 namespace {

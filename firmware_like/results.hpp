@@ -9,18 +9,18 @@
 // Failure      one line naming the first file that could not be written; all others are
 #pragma once
 
-#include <cstdint>
-#include <expected>
-#include <filesystem>
-#include <optional>
-#include <string>
-
 #include "firmware_like/controller.hpp"
 #include "firmware_like/environment_report.hpp"
 #include "firmware_like/picture.hpp"
 #include "firmware_like/run_folder.hpp"
 #include "firmware_like/surface_file.hpp"
 #include "firmware_like/whole_file.hpp"
+
+#include <cstdint>
+#include <expected>
+#include <filesystem>
+#include <optional>
+#include <string>
 
 namespace moldloft::firmware_like {
 

@@ -1,13 +1,5 @@
 #include "firmware_like/run_command.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <ctime>
-#include <iterator>
-#include <optional>
-#include <random>
-
 #include "firmware_like/cell_claim.hpp"
 #include "firmware_like/console.hpp"
 #include "firmware_like/control_loop.hpp"
@@ -25,6 +17,14 @@
 #include "hal/printable_text.hpp"
 #include "hal/serial_link.hpp"
 #include "hal/tcp_link.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <ctime>
+#include <iterator>
+#include <optional>
+#include <random>
 
 namespace moldloft::firmware_like {
 namespace {

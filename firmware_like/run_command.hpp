@@ -2,12 +2,12 @@
 // The value returned is the program's exit code.
 #pragma once
 
+#include "firmware_like/journal.hpp"
+#include "firmware_like/results.hpp"
+
 #include <optional>
 #include <string>
 #include <string_view>
-
-#include "firmware_like/journal.hpp"
-#include "firmware_like/results.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -1,19 +1,19 @@
 #include "firmware_like/run_folder.hpp"
 
-#include <fcntl.h>
-#include <fmt/chrono.h>
-#include <fmt/format.h>
-#include <sys/file.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <ctime>
-
 #include "firmware_like/build_info.hpp"
 #include "firmware_like/config.hpp"
 #include "firmware_like/flight_files.hpp"
 #include "firmware_like/plate_name.hpp"
 #include "firmware_like/surface_file.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <ctime>
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 namespace moldloft::firmware_like {
 namespace {

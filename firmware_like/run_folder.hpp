@@ -5,15 +5,15 @@
 //              (simulated runs, which a seed brings back, may be replaced by simulated runs)
 #pragma once
 
+#include "firmware_like/shot_files.hpp"
+#include "hal/claim.hpp"
+#include "hal/run_store.hpp"
+
 #include <expected>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
-
-#include "firmware_like/shot_files.hpp"
-#include "hal/claim.hpp"
-#include "hal/run_store.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -1,11 +1,11 @@
 #include "firmware_like/service_notify.hpp"
 
+#include "hal/printable_text.hpp"
+
 #include <fmt/format.h>
 #include <systemd/sd-daemon.h>
 
 #include <cstdint>
-
-#include "hal/printable_text.hpp"
 
 namespace moldloft::firmware_like {
 

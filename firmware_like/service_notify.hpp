@@ -7,9 +7,9 @@
 // Failure      none: a program that its manager does not hear is the manager's to restart
 #pragma once
 
-#include <string_view>
-
 #include "hal/clock.hpp"
+
+#include <string_view>
 
 namespace moldloft::firmware_like {
 

@@ -1,12 +1,12 @@
 #include "firmware_like/service_thread.hpp"
 
+#include "firmware_like/console.hpp"
+#include "firmware_like/journal.hpp"
+
 #include <fmt/format.h>
 
 #include <cstdio>
 #include <utility>
-
-#include "firmware_like/console.hpp"
-#include "firmware_like/journal.hpp"
 
 namespace moldloft::firmware_like {
 namespace {
@@ -55,8 +55,7 @@ void ServiceThread::work() {
 // On a terminal and in a file the progress says the same, and the run's last line what has ended it.
 void ServiceThread::pass_notices_on() {
   while (const auto notice = controller_.cell().next_notice()) {
-    if (stderr_is_journal())
-      say(for_journal(priority_of(*notice), notice_line(*notice)));
+    if (stderr_is_journal()) say(for_journal(priority_of(*notice), notice_line(*notice)));
   }
 }
 

@@ -2,13 +2,13 @@
 // hands what the cell has noted to the journal, where standard error is one.
 #pragma once
 
-#include <atomic>
-#include <filesystem>
-#include <thread>
-
 #include "firmware_like/controller.hpp"
 #include "firmware_like/progress_text.hpp"
 #include "firmware_like/service_watch.hpp"
+
+#include <atomic>
+#include <filesystem>
+#include <thread>
 
 namespace moldloft::firmware_like {
 

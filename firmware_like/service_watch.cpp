@@ -1,12 +1,12 @@
 #include "firmware_like/service_watch.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-
 #include "firmware_like/console.hpp"
 #include "firmware_like/journal.hpp"
 #include "firmware_like/results.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
 
 namespace moldloft::firmware_like {
 namespace {

@@ -8,14 +8,14 @@
 // Failure      none
 #pragma once
 
+#include "firmware_like/service_notify.hpp"
+#include "hal/clock.hpp"
+
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
-
-#include "firmware_like/service_notify.hpp"
-#include "hal/clock.hpp"
 
 namespace moldloft::firmware_like {
 

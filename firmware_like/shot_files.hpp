@@ -2,10 +2,10 @@
 // through first. Memory: 650 kB a shot of 50,000 points; loaded before the first tick.
 #pragma once
 
-#include <map>
-
 #include "hal/run_store.hpp"
 #include "tasks/shot_archive.hpp"
+
+#include <map>
 
 namespace moldloft::firmware_like {
 

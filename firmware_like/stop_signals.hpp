@@ -16,12 +16,11 @@
 // Failure      none
 #pragma once
 
-#include <signal.h>
+#include "firmware_like/controller.hpp"
 
+#include <signal.h>
 #include <utility>
 #include <vector>
-
-#include "firmware_like/controller.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -8,12 +8,12 @@
 // Failure      one line: which file, and what is wrong with it
 #pragma once
 
-#include <expected>
-#include <filesystem>
-
 #include "firmware_like/json_text.hpp"
 #include "firmware_like/run_folder.hpp"
 #include "geometry/splines/bspline.hpp"
+
+#include <expected>
+#include <filesystem>
 
 namespace moldloft::firmware_like {
 

@@ -2,9 +2,9 @@
 // for the slowest processor that we admit; what a run really took stands beside them in its timing report.
 #pragma once
 
-#include <array>
-
 #include "tasks/scheduler.hpp"
+
+#include <array>
 
 namespace moldloft::firmware_like {
 

@@ -1,9 +1,9 @@
 #include "firmware_like/thread_counts.hpp"
 
+#include "hal/realtime_section.hpp"
+
 #include <sched.h>
 #include <sys/resource.h>
-
-#include "hal/realtime_section.hpp"
 
 namespace moldloft::firmware_like {
 namespace {

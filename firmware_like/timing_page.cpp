@@ -1,12 +1,12 @@
 #include "firmware_like/timing_page.hpp"
 
-#include <fmt/format.h>
-
-#include <vector>
-
 #include "firmware_like/log_plot.hpp"
 #include "firmware_like/timing_report.hpp"
 #include "hal/printable_text.hpp"
+
+#include <fmt/format.h>
+
+#include <vector>
 
 namespace moldloft::firmware_like {
 namespace {

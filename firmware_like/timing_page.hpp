@@ -6,11 +6,11 @@
 // Failure      throws Json::exception where a report lacks what every report has: one of another version
 #pragma once
 
+#include "firmware_like/surface_file.hpp"
+
 #include <filesystem>
 #include <string>
 #include <string_view>
-
-#include "firmware_like/surface_file.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -11,13 +11,13 @@
 // Failure      none
 #pragma once
 
+#include "firmware_like/controller.hpp"
+#include "firmware_like/environment_report.hpp"
+
 #include <array>
 #include <optional>
 #include <string>
 #include <string_view>
-
-#include "firmware_like/controller.hpp"
-#include "firmware_like/environment_report.hpp"
 
 namespace moldloft::firmware_like {
 

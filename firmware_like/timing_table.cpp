@@ -1,8 +1,8 @@
 #include "firmware_like/timing_table.hpp"
 
-#include <fmt/format.h>
-
 #include "firmware_like/timing_report.hpp"
+
+#include <fmt/format.h>
 
 namespace moldloft::firmware_like {
 namespace {

@@ -5,9 +5,9 @@
 // Failure      throws Json::exception where a report lacks what every report has: one of another version
 #pragma once
 
-#include <string>
-
 #include "firmware_like/surface_file.hpp"
+
+#include <string>
 
 namespace moldloft::firmware_like {
 

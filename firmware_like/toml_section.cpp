@@ -1,12 +1,12 @@
 #include "firmware_like/toml_section.hpp"
 
+#include "hal/printable_text.hpp"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
-
-#include "hal/printable_text.hpp"
 
 namespace moldloft::firmware_like {
 namespace {

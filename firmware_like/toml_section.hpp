@@ -4,6 +4,8 @@
 // Setup time only: allocates. All errors of a file are collected, each with its line and key.
 #pragma once
 
+#include "firmware_like/config_rules.hpp"
+
 #include <toml++/toml.h>
 
 #include <array>
@@ -12,8 +14,6 @@
 #include <string>
 #include <string_view>
 #include <vector>
-
-#include "firmware_like/config_rules.hpp"
 
 namespace moldloft::firmware_like {
 

@@ -1,20 +1,20 @@
 #include "firmware_like/whole_file.hpp"
 
-#include <fcntl.h>
+#include "hal/clock.hpp"
+
 #include <fmt/format.h>
-#include <poll.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <fcntl.h>
 #include <fstream>
 #include <optional>
+#include <poll.h>
 #include <string>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <utility>
-
-#include "hal/clock.hpp"
 
 namespace moldloft::firmware_like {
 namespace {

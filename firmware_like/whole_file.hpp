@@ -8,11 +8,11 @@
 // Failure      one line: which file, why, what to do
 #pragma once
 
+#include "firmware_like/run_folder.hpp"
+
 #include <expected>
 #include <filesystem>
 #include <string_view>
-
-#include "firmware_like/run_folder.hpp"
 
 namespace moldloft::firmware_like {
 

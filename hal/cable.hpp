@@ -7,10 +7,10 @@
 // Failure      cut() loses the link on both sides; open() on the host's side brings it back once mend() was called
 #pragma once
 
-#include <memory>
-
 #include "hal/byte_link.hpp"
 #include "hal/clock.hpp"
+
+#include <memory>
 
 namespace moldloft::hal {
 
@@ -25,7 +25,7 @@ class Cable {
   Cable(Clock&, const Settings&);
   ~Cable();
 
-  ByteLink& host() noexcept;    // the controller's end; open() succeeds at once while the cable is whole
+  ByteLink& host() noexcept;  // the controller's end; open() succeeds at once while the cable is whole
   // The device's end; open while the host's end is open. After the host has opened anew it is `lost` for one
   // look: that is how a server learns of the new connection.
   ByteLink& device() noexcept;

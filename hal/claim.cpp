@@ -1,19 +1,19 @@
 #include "hal/claim.hpp"
 
+#include "hal/tcp_link.hpp"
+
 #include <fmt/format.h>
-#include <sys/socket.h>
-#include <sys/stat.h>
-#include <sys/sysmacros.h>
-#include <sys/un.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstddef>
 #include <cstdio>
 #include <cstring>
 #include <optional>
-
-#include "hal/tcp_link.hpp"
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
+#include <sys/un.h>
+#include <unistd.h>
 
 namespace moldloft::hal {
 namespace {

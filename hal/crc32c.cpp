@@ -1,10 +1,10 @@
 #include "hal/crc32c.hpp"
 
+#include "hal/psc1.hpp"
+
 #include <array>
 #include <bit>
 #include <cstring>
-
-#include "hal/psc1.hpp"
 
 #if defined(__x86_64__)
 #include <nmmintrin.h>

@@ -1,10 +1,10 @@
 #include "hal/flight_dump.hpp"
 
+#include "hal/printable_text.hpp"
+
 #include <fmt/format.h>
 
 #include <fstream>
-
-#include "hal/printable_text.hpp"
 
 namespace moldloft::hal {
 namespace {

@@ -7,14 +7,14 @@
 // Failure      one line that names the file and what is wrong with it
 #pragma once
 
+#include "hal/run_record.hpp"
+
 #include <array>
 #include <cstdint>
 #include <expected>
 #include <string>
 #include <string_view>
 #include <vector>
-
-#include "hal/run_record.hpp"
 
 namespace moldloft::hal {
 

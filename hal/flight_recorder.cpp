@@ -1,12 +1,11 @@
 #include "hal/flight_recorder.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <bit>
 #include <cassert>
 #include <cerrno>
 #include <span>
+#include <unistd.h>
 
 namespace moldloft::hal {
 namespace {

@@ -12,13 +12,13 @@
 //              its disk
 #pragma once
 
+#include "hal/flight_dump.hpp"
+#include "hal/realtime.hpp"
+
 #include <array>
 #include <atomic>
 #include <cstdint>
 #include <vector>
-
-#include "hal/flight_dump.hpp"
-#include "hal/realtime.hpp"
 
 namespace moldloft::hal {
 

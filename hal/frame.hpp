@@ -7,11 +7,11 @@
 // Allocation   in the constructor only: a frame never holds more than the sensor said it can deliver
 #pragma once
 
+#include "hal/clock.hpp"
+
 #include <cstdint>
 #include <span>
 #include <vector>
-
-#include "hal/clock.hpp"
 
 namespace moldloft::hal {
 

@@ -1,11 +1,11 @@
 #include "hal/line_robot.hpp"
 
+#include "hal/printable_text.hpp"
+
 #include <algorithm>
 #include <cassert>
 #include <optional>
 #include <utility>
-
-#include "hal/printable_text.hpp"
 
 namespace moldloft::hal {
 

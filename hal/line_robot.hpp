@@ -10,14 +10,14 @@
 // Thread, blocking, allocation, failure: as Robot says
 #pragma once
 
-#include <array>
-#include <cstddef>
-#include <optional>
-
 #include "hal/byte_link.hpp"
 #include "hal/event_queue.hpp"
 #include "hal/robot.hpp"
 #include "hal/robot_line.hpp"
+
+#include <array>
+#include <cstddef>
+#include <optional>
 
 namespace moldloft::hal {
 

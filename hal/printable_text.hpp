@@ -13,11 +13,11 @@
 // Allocation   make_printable: none; the others as their result does
 #pragma once
 
+#include "hal/fixed_text.hpp"
+
 #include <span>
 #include <string>
 #include <string_view>
-
-#include "hal/fixed_text.hpp"
 
 namespace moldloft::hal {
 

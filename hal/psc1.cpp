@@ -1,9 +1,9 @@
 #include "hal/psc1.hpp"
 
-#include <algorithm>
-
 #include "hal/little_endian.hpp"
 #include "hal/printable_text.hpp"
+
+#include <algorithm>
 
 namespace moldloft::hal::psc1 {
 namespace {

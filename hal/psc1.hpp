@@ -9,14 +9,14 @@
 // Failure      encoders return 0 when the buffer is too small; decoders say what is wrong
 #pragma once
 
+#include "hal/fixed_text.hpp"
+#include "hal/frame.hpp"
+#include "hal/realtime.hpp"
+
 #include <array>
 #include <cstdint>
 #include <expected>
 #include <span>
-
-#include "hal/fixed_text.hpp"
-#include "hal/frame.hpp"
-#include "hal/realtime.hpp"
 
 namespace moldloft::hal::psc1 {
 

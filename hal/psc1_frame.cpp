@@ -1,12 +1,12 @@
 // FRAME of PSC1: descriptor, stripe table, columns. Points are decoded in the slack of the ticks, so the loops over
 // them are written in blocks of a constant size, which the compiler turns into vector code at -O2.
+#include "hal/little_endian.hpp"
+#include "hal/psc1.hpp"
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
-
-#include "hal/little_endian.hpp"
-#include "hal/psc1.hpp"
 
 namespace moldloft::hal::psc1 {
 namespace {

@@ -1,11 +1,11 @@
 #include "hal/psc_scanner.hpp"
 
+#include "hal/printable_text.hpp"
+
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <utility>
-
-#include "hal/printable_text.hpp"
 
 namespace moldloft::hal {
 

@@ -10,14 +10,14 @@
 // Thread, blocking, allocation, failure: as Scanner says
 #pragma once
 
-#include <array>
-#include <cstddef>
-#include <vector>
-
 #include "hal/byte_link.hpp"
 #include "hal/event_queue.hpp"
 #include "hal/psc1.hpp"
 #include "hal/scanner.hpp"
+
+#include <array>
+#include <cstddef>
+#include <vector>
 
 namespace moldloft::hal {
 

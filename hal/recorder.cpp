@@ -1,14 +1,14 @@
 #include "hal/recorder.hpp"
 
-#include <array>
-#include <cstring>
-#include <utility>
-
 #include "hal/flight_recorder.hpp"
 #include "hal/latest_value.hpp"
 #include "hal/printable_text.hpp"
 #include "hal/record_ring.hpp"
 #include "hal/run_store.hpp"
+
+#include <array>
+#include <cstring>
+#include <utility>
 
 namespace moldloft::hal {
 namespace {

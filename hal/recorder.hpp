@@ -11,13 +11,13 @@
 //              rings: room_for_frame() turns false and store_error() says why.
 #pragma once
 
+#include "hal/realtime.hpp"
+#include "hal/run_record.hpp"
+
 #include <atomic>
 #include <cstddef>
 #include <memory>
 #include <span>
-
-#include "hal/realtime.hpp"
-#include "hal/run_record.hpp"
 
 namespace moldloft::hal {
 

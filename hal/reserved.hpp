@@ -5,11 +5,11 @@
 // Failure      a vector without room is a mistake in the memory plan: asserts
 #pragma once
 
+#include "hal/realtime.hpp"
+
 #include <cassert>
 #include <utility>
 #include <vector>
-
-#include "hal/realtime.hpp"
 
 namespace moldloft::hal {
 

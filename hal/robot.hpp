@@ -8,12 +8,12 @@
 //              of the link can move the arm twice; what the driver cannot mend comes out as an event
 #pragma once
 
-#include <optional>
-
 #include "hal/clock.hpp"
 #include "hal/fixed_text.hpp"
 #include "hal/pose.hpp"
 #include "hal/realtime.hpp"
+
+#include <optional>
 
 namespace moldloft::hal {
 

@@ -9,13 +9,13 @@
 // Failure      a line that is not one gives the reason; a line never exceeds 120 characters
 #pragma once
 
-#include <cstdint>
-#include <expected>
-#include <string_view>
-
 #include "hal/fixed_text.hpp"
 #include "hal/pose.hpp"
 #include "hal/realtime.hpp"
+
+#include <cstdint>
+#include <expected>
+#include <string_view>
 
 namespace moldloft::hal::robot_line {
 

@@ -4,11 +4,11 @@
 // the run store (run_store.hpp).
 #pragma once
 
-#include <cstdint>
-
 #include "hal/clock.hpp"
 #include "hal/fixed_text.hpp"
 #include "hal/pose.hpp"
+
+#include <cstdint>
 
 namespace moldloft::hal {
 
@@ -40,8 +40,8 @@ struct ShotRecord {
   Instant at{0};  // when its last byte had been read
   std::uint32_t shot_id = 0;
   ShotPurpose purpose{};
-  std::uint16_t attempts = 1;  // 1: the first exposure was good
-  Pose commanded{}, reported{};    // world_from_tip
+  std::uint16_t attempts = 1;    // 1: the first exposure was good
+  Pose commanded{}, reported{};  // world_from_tip
   std::uint64_t payload_offset = 0;
   std::uint32_t payload_bytes = 0;
 };

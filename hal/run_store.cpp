@@ -1,17 +1,16 @@
 #include "hal/run_store.hpp"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <array>
-#include <filesystem>
-#include <utility>
-
 #include "hal/printable_text.hpp"
 #include "hal/psc1.hpp"
 #include "hal/statement.hpp"
+
+#include <algorithm>
+#include <array>
+#include <fcntl.h>
+#include <filesystem>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <utility>
 
 namespace moldloft::hal {
 namespace {

@@ -11,14 +11,14 @@
 // Failure      std::expected with one line for a person
 #pragma once
 
+#include "hal/frame.hpp"
+#include "hal/run_record.hpp"
+
 #include <cstdint>
 #include <expected>
 #include <memory>
 #include <string>
 #include <vector>
-
-#include "hal/frame.hpp"
-#include "hal/run_record.hpp"
 
 namespace moldloft::hal {
 

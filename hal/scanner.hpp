@@ -8,13 +8,13 @@
 //              repeats a request (at most twice) under its shot id; what it cannot mend comes out as an event
 #pragma once
 
-#include <cstdint>
-#include <optional>
-
 #include "hal/clock.hpp"
 #include "hal/fixed_text.hpp"
 #include "hal/frame.hpp"
 #include "hal/realtime.hpp"
+
+#include <cstdint>
+#include <optional>
 
 namespace moldloft::hal {
 

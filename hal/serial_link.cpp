@@ -6,17 +6,17 @@
 #include "hal/realtime_section.hpp"
 
 #include <libserialport.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
 #include <poll.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
 #include <system_error>
+#include <unistd.h>
 #include <utility>
 
 namespace moldloft::hal {

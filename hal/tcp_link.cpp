@@ -4,14 +4,14 @@
 #include "hal/realtime.hpp"
 #include "hal/realtime_section.hpp"
 
-#include <netdb.h>
-#include <poll.h>
-#include <sys/socket.h>
-
 #include <asio/ip/tcp.hpp>
+
 #include <cerrno>
 #include <cstring>
+#include <netdb.h>
 #include <optional>
+#include <poll.h>
+#include <sys/socket.h>
 #include <utility>
 
 namespace moldloft::hal {

@@ -5,11 +5,11 @@
 // Thread, blocking, allocation, failure: as ByteLink says. open() allocates; read(), write() and state() do not.
 #pragma once
 
+#include "hal/byte_link.hpp"
+
 #include <cstdint>
 #include <memory>
 #include <string>
-
-#include "hal/byte_link.hpp"
 
 namespace moldloft::hal {
 

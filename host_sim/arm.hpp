@@ -9,14 +9,14 @@
 // Failure      std::expected with one line that names joint and limit
 #pragma once
 
-#include <expected>
-#include <memory>
-#include <string_view>
-
 #include "geometry/rigid_motion.hpp"
 #include "hal/fixed_text.hpp"
 #include "hal/pose.hpp"
 #include "host_sim/joint_motion.hpp"
+
+#include <expected>
+#include <memory>
+#include <string_view>
 
 namespace moldloft::host_sim {
 

@@ -1,8 +1,11 @@
 #include "host_sim/campaign.hpp"
 
+#include "firmware_like/console.hpp"
+#include "firmware_like/option_values.hpp"
+#include "host_sim/simulated_run.hpp"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -10,11 +13,8 @@
 #include <limits>
 #include <mutex>
 #include <thread>
+#include <unistd.h>
 #include <vector>
-
-#include "firmware_like/console.hpp"
-#include "firmware_like/option_values.hpp"
-#include "host_sim/simulated_run.hpp"
 
 namespace moldloft::host_sim {
 

@@ -2,12 +2,12 @@
 // project promises. Two runs at a time, each in a thread of its own; a run's result does not depend on that.
 #pragma once
 
+#include "host_sim/cell_description.hpp"
+
 #include <cstdint>
 #include <expected>
 #include <string>
 #include <string_view>
-
-#include "host_sim/cell_description.hpp"
 
 namespace moldloft::host_sim {
 

@@ -1,12 +1,12 @@
 #include "host_sim/cell_config.hpp"
 
+#include "hal/printable_text.hpp"
+#include "tasks/tool_pose.hpp"
+
 #include <fmt/format.h>
 
 #include <cmath>
 #include <fstream>
-
-#include "hal/printable_text.hpp"
-#include "tasks/tool_pose.hpp"
 
 namespace moldloft::host_sim {
 namespace {

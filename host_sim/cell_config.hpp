@@ -3,11 +3,11 @@
 // the truth.
 #pragma once
 
-#include <expected>
-#include <string>
-
 #include "firmware_like/config.hpp"
 #include "host_sim/cell_description.hpp"
+
+#include <expected>
+#include <string>
 
 namespace moldloft::host_sim {
 

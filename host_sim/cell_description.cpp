@@ -1,5 +1,7 @@
 #include "host_sim/cell_description.hpp"
 
+#include "host_sim/plan_polygon.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,14 +11,12 @@
 #include <numbers>
 #include <vector>
 
-#include "host_sim/plan_polygon.hpp"
-
 namespace moldloft::host_sim {
 
 namespace {
 
 constexpr double field_over_table_mm = 15;
-constexpr double look_beyond_mm = 20;   // a tracker's field of view hangs over the edge
+constexpr double look_beyond_mm = 20;  // a tracker's field of view hangs over the edge
 constexpr double nearest_places_mm = 5;
 constexpr double field_radius_mm = 75;  // the field's corners are 72 mm from its centre
 
@@ -30,7 +30,8 @@ std::expected<std::shared_ptr<const Plate>, SimError> plate_of(const CellDescrip
     return read_mesh_plate(cell.plate, cell.unit.value_or(LengthUnit::millimetre), cell.thickness_mm);
   }
   const auto shape = shape_named(cell.plate);
-  if (!shape) return std::unexpected(SimError{shape.error().what + ", or give the path of a PLY or STL file"});
+  if (!shape)
+    return std::unexpected(SimError{shape.error().what + ", or give the path of a PLY or STL file"});
   return make_plate({*shape, outline_corners(cell.outline, cell.sizes), cell.thickness_mm, cell.amplitude_mm,
                      cell.radius_mm});
 }
@@ -92,7 +93,8 @@ geometry::RigidMotion nominal_mount() {
 bool is_mesh(const CellDescription& cell) {
   if (shape_named(cell.plate)) return false;
   std::string name = cell.plate;
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::ranges::transform(name, name.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   std::error_code unknown;
   return name.find('/') != name.npos || name.ends_with(".ply") || name.ends_with(".stl") ||
          std::filesystem::exists(cell.plate, unknown);

@@ -11,9 +11,6 @@
 // (joint 1 aside); any heading whatever only from 372 to 660 mm. A plate of 305 mm needs the former.
 #pragma once
 
-#include <optional>
-#include <string>
-
 #include "host_sim/arm_drive.hpp"
 #include "host_sim/gantry_arm.hpp"
 #include "host_sim/mesh_plate.hpp"
@@ -21,6 +18,9 @@
 #include "host_sim/robot_server.hpp"
 #include "host_sim/scanner_server.hpp"
 #include "host_sim/scara_arm.hpp"
+
+#include <optional>
+#include <string>
 
 namespace moldloft::host_sim {
 

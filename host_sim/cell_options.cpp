@@ -1,10 +1,10 @@
 #include "host_sim/cell_options.hpp"
 
+#include "firmware_like/option_values.hpp"
+
 #include <cstdint>
 #include <limits>
 #include <string>
-
-#include "firmware_like/option_values.hpp"
 
 namespace moldloft::host_sim {
 
@@ -31,19 +31,24 @@ CLI::Option* add_named(CLI::App& command, const std::string& name, Value& value,
 void refuse_contradictions(const CLI::App& command, const CellDescription& cell) {
   if (!is_mesh(cell)) {
     if (command.count("--unit") > 0)
-      throw CLI::ValidationError("--unit", "is for mesh files; the plate '" + cell.plate + "' is a formula in mm");
+      throw CLI::ValidationError("--unit",
+                                 "is for mesh files; the plate '" + cell.plate + "' is a formula in mm");
     return;
   }
-  for (const char* option : {"--outline", "--width", "--depth", "--top-width", "--shear", "--amplitude", "--radius"}) {
+  for (const char* option :
+       {"--outline", "--width", "--depth", "--top-width", "--shear", "--amplitude", "--radius"}) {
     if (command.count(option) > 0)
-      throw CLI::ValidationError(option, "is for plates by formula; the mesh " + cell.plate + " has its own shape");
+      throw CLI::ValidationError(option,
+                                 "is for plates by formula; the mesh " + cell.plate + " has its own shape");
   }
 }
 
 }  // namespace
 
 void add_cell_options(CLI::App& command, CellDescription& cell) {
-  command.add_option("--plate", cell.plate, "flat, cylinder, saddle, twist, dome, wave, or a mesh: FILE.ply, FILE.stl")
+  command
+      .add_option("--plate", cell.plate,
+                  "flat, cylinder, saddle, twist, dome, wave, or a mesh: FILE.ply, FILE.stl")
       ->capture_default_str();
   add_named(command, "--unit", cell.unit, unit_named, "unit of the mesh file: mm (default), cm, m or inch");
   add_named(command, "--outline", cell.outline, outline_named,

@@ -2,9 +2,9 @@
 // must outlive the parsing.
 #pragma once
 
-#include <CLI/CLI.hpp>
-
 #include "host_sim/cell_description.hpp"
+
+#include <CLI/CLI.hpp>
 
 namespace moldloft::host_sim {
 

@@ -1,13 +1,5 @@
 #include "host_sim/day.hpp"
 
-#include <fmt/format.h>
-#include <malloc.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
-
 #include "firmware_like/console.hpp"
 #include "firmware_like/controller.hpp"
 #include "firmware_like/results.hpp"
@@ -15,6 +7,14 @@
 #include "host_sim/cell_config.hpp"
 #include "host_sim/judge.hpp"
 #include "host_sim/world_clock.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <malloc.h>
+#include <unistd.h>
 
 namespace moldloft::host_sim {
 

@@ -5,9 +5,9 @@
 // Failure      one line; a plate that does not complete ends the day
 #pragma once
 
-#include <functional>
-
 #include "host_sim/cell_description.hpp"
+
+#include <functional>
 
 namespace moldloft::host_sim {
 

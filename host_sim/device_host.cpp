@@ -1,9 +1,5 @@
 #include "host_sim/device_host.hpp"
 
-#include <fmt/format.h>
-
-#include <csignal>
-
 #include "firmware_like/console.hpp"
 #include "firmware_like/results.hpp"
 #include "hal/cable.hpp"
@@ -15,6 +11,10 @@
 #include "host_sim/tcp_server_link.hpp"
 #include "host_sim/world.hpp"
 #include "host_sim/world_clock.hpp"
+
+#include <fmt/format.h>
+
+#include <csignal>
 
 namespace moldloft::host_sim {
 

@@ -2,9 +2,9 @@
 // serial port of the machine's own, for a controller that cannot tell them from real ones.
 #pragma once
 
-#include <string>
-
 #include "host_sim/cell_description.hpp"
+
+#include <string>
 
 namespace moldloft::host_sim {
 

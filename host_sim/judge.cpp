@@ -1,16 +1,16 @@
 #include "host_sim/judge.hpp"
 
-#include <fmt/format.h>
+#include "firmware_like/surface_file.hpp"
+#include "firmware_like/whole_file.hpp"
+#include "host_sim/plan_polygon.hpp"
 
 #include <Eigen/LU>
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
-
-#include "firmware_like/surface_file.hpp"
-#include "firmware_like/whole_file.hpp"
-#include "host_sim/plan_polygon.hpp"
 
 namespace moldloft::host_sim {
 
@@ -173,7 +173,8 @@ std::expected<Verdict, SimError> judge_run(const std::string& folder, const Plat
                          {"normal_rms_mm", verdict->normal_rms_mm},
                          {"outline_max_mm", verdict->outline_max_mm},
                          {"corner_max_mm", verdict->corner_max_mm}};
-  if (const auto written = firmware_like::write_file(path, firmware_like::json_text(*summary, 2) + "\n"); !written)
+  if (const auto written = firmware_like::write_file(path, firmware_like::json_text(*summary, 2) + "\n");
+      !written)
     return std::unexpected(SimError{written.error().what});
   return verdict;
 }

@@ -9,13 +9,13 @@
 // Failure      one line: a file that is missing or not what it should be, a surface that nowhere lies over the plate
 #pragma once
 
+#include "geometry/splines/bspline.hpp"
+#include "host_sim/cell_description.hpp"
+
 #include <array>
 #include <expected>
 #include <string>
 #include <vector>
-
-#include "geometry/splines/bspline.hpp"
-#include "host_sim/cell_description.hpp"
 
 namespace moldloft::host_sim {
 

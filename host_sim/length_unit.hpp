@@ -1,12 +1,12 @@
 // The units in which a mesh file may be written, and which of them a size speaks for.
 #pragma once
 
+#include "host_sim/sim_error.hpp"
+
 #include <expected>
 #include <optional>
 #include <string>
 #include <string_view>
-
-#include "host_sim/sim_error.hpp"
 
 namespace moldloft::host_sim {
 

@@ -1,15 +1,4 @@
 // moldloft-sim: the simulated cell as a program.
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-#include <unistd.h>
-
-#include <CLI/CLI.hpp>
-#include <algorithm>
-#include <cstdio>
-#include <cstdlib>
-#include <span>
-#include <sstream>
-
 #include "firmware_like/build_info.hpp"
 #include "firmware_like/command_line.hpp"
 #include "firmware_like/console.hpp"
@@ -24,6 +13,17 @@
 #include "host_sim/device_host.hpp"
 #include "host_sim/judge.hpp"
 #include "host_sim/simulated_run.hpp"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <span>
+#include <sstream>
+#include <unistd.h>
 
 using namespace moldloft::host_sim;
 using moldloft::firmware_like::add_number_with_default;

@@ -6,9 +6,9 @@
 // Cost         linear but for vertices in very many faces, n log n there
 #pragma once
 
-#include <vector>
-
 #include "host_sim/triangle_mesh.hpp"
+
+#include <vector>
 
 namespace moldloft::host_sim {
 

@@ -1,15 +1,15 @@
 #include "host_sim/mesh_flat.hpp"
 
-#include <fmt/format.h>
+#include "host_sim/mesh_edges.hpp"
+#include "host_sim/plan_polygon.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include "host_sim/mesh_edges.hpp"
-#include "host_sim/plan_polygon.hpp"
 
 namespace moldloft::host_sim {
 
@@ -19,7 +19,7 @@ constexpr double most_facing_down =
     0.01;                          // of the area: small folds of a scan are dropped, a second sheet is not
 constexpr double steepest = 0.05;  // of a face's normal upwards: below, a face at the border stands on edge
 constexpr double smallest_hole = 1e-6;  // of the plate's area: below, it is a crack
-constexpr int most_peels = 100;        // of faces that stand on edge, one behind the other
+constexpr int most_peels = 100;         // of faces that stand on edge, one behind the other
 
 double plan_area(const TriangleMesh& mesh, const Triangle& t) {
   const auto &a = mesh.corner(t, 0), &b = mesh.corner(t, 1), &c = mesh.corner(t, 2);

@@ -5,13 +5,14 @@
 // Failure      one line: a closed surface, one that folds back over itself
 #pragma once
 
+#include "host_sim/sim_error.hpp"
+#include "host_sim/triangle_mesh.hpp"
+
 #include <Eigen/Core>
+
 #include <expected>
 #include <string>
 #include <vector>
-
-#include "host_sim/sim_error.hpp"
-#include "host_sim/triangle_mesh.hpp"
 
 namespace moldloft::host_sim {
 

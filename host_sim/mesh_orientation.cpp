@@ -1,9 +1,10 @@
 #include "host_sim/mesh_orientation.hpp"
 
-#include <Eigen/Geometry>
-#include <utility>
-
 #include "host_sim/mesh_edges.hpp"
+
+#include <Eigen/Geometry>
+
+#include <utility>
 
 namespace moldloft::host_sim {
 

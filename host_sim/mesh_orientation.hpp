@@ -6,10 +6,10 @@
 // Cost         linear
 #pragma once
 
+#include "host_sim/triangle_mesh.hpp"
+
 #include <optional>
 #include <vector>
-
-#include "host_sim/triangle_mesh.hpp"
 
 namespace moldloft::host_sim {
 

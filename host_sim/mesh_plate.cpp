@@ -1,15 +1,15 @@
 #include "host_sim/mesh_plate.hpp"
 
-#include <fmt/format.h>
+#include "host_sim/mesh_flat.hpp"
+#include "host_sim/outline_grid.hpp"
 
 #include <Eigen/Geometry>
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
-
-#include "host_sim/mesh_flat.hpp"
-#include "host_sim/outline_grid.hpp"
 
 namespace moldloft::host_sim {
 

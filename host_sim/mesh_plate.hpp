@@ -11,14 +11,14 @@
 //              too few digits
 #pragma once
 
-#include <expected>
-#include <span>
-#include <string>
-
 #include "host_sim/length_unit.hpp"
 #include "host_sim/mesh_file.hpp"
 #include "host_sim/mesh_repair.hpp"
 #include "host_sim/plate.hpp"
+
+#include <expected>
+#include <span>
+#include <string>
 
 namespace moldloft::host_sim {
 

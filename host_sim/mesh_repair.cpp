@@ -1,16 +1,16 @@
 #include "host_sim/mesh_repair.hpp"
 
-#include <fmt/format.h>
+#include "host_sim/mesh_edges.hpp"
+#include "host_sim/mesh_orientation.hpp"
+#include "host_sim/mesh_weld.hpp"
 
 #include <Eigen/Geometry>
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
-
-#include "host_sim/mesh_edges.hpp"
-#include "host_sim/mesh_orientation.hpp"
-#include "host_sim/mesh_weld.hpp"
 
 namespace moldloft::host_sim {
 

@@ -10,11 +10,11 @@
 //              the file has too few digits, edges with three faces, a one-sided surface, several sheets
 #pragma once
 
-#include <expected>
-#include <string>
-
 #include "host_sim/sim_error.hpp"
 #include "host_sim/triangle_mesh.hpp"
+
+#include <expected>
+#include <string>
 
 namespace moldloft::host_sim {
 

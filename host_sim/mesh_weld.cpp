@@ -1,13 +1,13 @@
 #include "host_sim/mesh_weld.hpp"
 
+#include "host_sim/mesh_edges.hpp"
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <unordered_map>
-
-#include "host_sim/mesh_edges.hpp"
 
 namespace moldloft::host_sim {
 

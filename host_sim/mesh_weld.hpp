@@ -3,9 +3,9 @@
 // Cost         linear
 #pragma once
 
-#include <vector>
-
 #include "host_sim/triangle_mesh.hpp"
+
+#include <vector>
 
 namespace moldloft::host_sim {
 

@@ -1,10 +1,10 @@
 #include "host_sim/optics.hpp"
 
+#include "host_sim/ray_cast.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include "host_sim/ray_cast.hpp"
 
 namespace moldloft::host_sim {
 

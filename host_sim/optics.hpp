@@ -11,13 +11,14 @@
 // Failure      none; where nothing is measured the point is missing (NaN)
 #pragma once
 
-#include <Eigen/Core>
-#include <vector>
-
 #include "geometry/rigid_motion.hpp"
 #include "hal/frame.hpp"
 #include "host_sim/plate.hpp"
 #include "host_sim/random.hpp"
+
+#include <Eigen/Core>
+
+#include <vector>
 
 namespace moldloft::host_sim {
 

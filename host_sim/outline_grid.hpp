@@ -9,11 +9,11 @@
 // Allocation   at construction only
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include "host_sim/plan_polygon.hpp"
 #include "host_sim/plan_raster.hpp"
+
+#include <cstdint>
+#include <vector>
 
 namespace moldloft::host_sim {
 

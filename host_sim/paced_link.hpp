@@ -8,10 +8,10 @@
 // Failure      those of the link within; asserts on a wire that carries less than a byte a millisecond
 #pragma once
 
-#include <memory>
-
 #include "hal/byte_link.hpp"
 #include "hal/clock.hpp"
+
+#include <memory>
 
 namespace moldloft::host_sim {
 

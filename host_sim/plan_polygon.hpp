@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+
 #include <array>
 #include <span>
 #include <vector>

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+
 #include <algorithm>
 #include <cstddef>
 #include <limits>

@@ -6,13 +6,14 @@
 // Allocation   at construction only
 #pragma once
 
+#include "geometry/rigid_motion.hpp"
+
 #include <Eigen/Core>
+
 #include <array>
 #include <memory>
 #include <string>
 #include <vector>
-
-#include "geometry/rigid_motion.hpp"
 
 namespace moldloft::host_sim {
 

@@ -1,14 +1,14 @@
 #include "host_sim/plate_shape.hpp"
 
+#include "host_sim/plan_polygon.hpp"
+#include "host_sim/portable_math.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
-
-#include "host_sim/plan_polygon.hpp"
-#include "host_sim/portable_math.hpp"
 
 namespace moldloft::host_sim {
 

@@ -13,12 +13,12 @@
 // Failure      one line that names the plate and what is impossible about it
 #pragma once
 
+#include "host_sim/plate.hpp"
+#include "host_sim/sim_error.hpp"
+
 #include <expected>
 #include <span>
 #include <string_view>
-
-#include "host_sim/plate.hpp"
-#include "host_sim/sim_error.hpp"
 
 namespace moldloft::host_sim {
 

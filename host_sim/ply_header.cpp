@@ -1,11 +1,11 @@
 #include "host_sim/ply_header.hpp"
 
+#include "host_sim/text_cursor.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
-
-#include "host_sim/text_cursor.hpp"
 
 namespace moldloft::host_sim {
 

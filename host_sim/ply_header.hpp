@@ -4,14 +4,14 @@
 // comments and obj_info stand anywhere.
 #pragma once
 
+#include "host_sim/sim_error.hpp"
+
 #include <cstdint>
 #include <expected>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
-
-#include "host_sim/sim_error.hpp"
 
 namespace moldloft::host_sim {
 

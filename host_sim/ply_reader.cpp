@@ -1,12 +1,12 @@
 #include "host_sim/ply_reader.hpp"
 
+#include "host_sim/ply_rows.hpp"
+
 #include <fmt/format.h>
 
 #include <bit>
 #include <cmath>
 #include <limits>
-
-#include "host_sim/ply_rows.hpp"
 
 namespace moldloft::host_sim {
 

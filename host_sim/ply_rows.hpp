@@ -2,6 +2,9 @@
 // the header's order, and it is ended. After a failure why() says what is wrong, with the place.
 #pragma once
 
+#include "host_sim/ply_header.hpp"
+#include "host_sim/text_cursor.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,9 +12,6 @@
 #include <optional>
 #include <string>
 #include <utility>
-
-#include "host_sim/ply_header.hpp"
-#include "host_sim/text_cursor.hpp"
 
 namespace moldloft::host_sim {
 

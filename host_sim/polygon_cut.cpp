@@ -1,7 +1,8 @@
-#include <Eigen/Geometry>
-#include <algorithm>
-
 #include "host_sim/triangle_mesh.hpp"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
 
 namespace moldloft::host_sim {
 

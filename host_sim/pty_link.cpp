@@ -1,17 +1,17 @@
 #include "host_sim/pty_link.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <poll.h>
-#include <stdlib.h>
-#include <termios.h>
-#include <unistd.h>
 
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <fcntl.h>
 #include <filesystem>
+#include <poll.h>
+#include <stdlib.h>
 #include <system_error>
+#include <termios.h>
+#include <unistd.h>
 
 // A simulated device: its descriptors do not wait either, but it promises nothing.
 MOLDLOFT_CHECKED_AT_RUN_TIME

@@ -10,12 +10,12 @@
 // Failure      create() says why there is no terminal or why the name cannot be had
 #pragma once
 
+#include "hal/byte_link.hpp"
+#include "host_sim/sim_error.hpp"
+
 #include <expected>
 #include <memory>
 #include <string>
-
-#include "hal/byte_link.hpp"
-#include "host_sim/sim_error.hpp"
 
 namespace moldloft::host_sim {
 

@@ -11,11 +11,11 @@
 
 int ioctl(int handle, unsigned long request, ...) {
   static int (*kernel)(int, unsigned long, ...);
-  if (!kernel) *(void **)&kernel = dlsym(RTLD_NEXT, "ioctl");
+  if (!kernel) *(void**)&kernel = dlsym(RTLD_NEXT, "ioctl");
 
   va_list arguments;
   va_start(arguments, request);
-  void *argument = va_arg(arguments, void *);
+  void* argument = va_arg(arguments, void*);
   va_end(arguments);
 
   const int result = kernel(handle, request, argument);
@@ -26,7 +26,7 @@ int ioctl(int handle, unsigned long request, ...) {
     errno = ENOTTY; /* isatty() may have set its own */
     return result;
   }
-  if (request == TIOCMGET) *(int *)argument = TIOCM_DTR | TIOCM_RTS | TIOCM_CTS | TIOCM_DSR | TIOCM_CAR;
+  if (request == TIOCMGET) *(int*)argument = TIOCM_DTR | TIOCM_RTS | TIOCM_CTS | TIOCM_DSR | TIOCM_CAR;
   errno = 0;
   return 0;
 }

@@ -6,10 +6,10 @@
 // does not depend on what another has drawn before.
 #pragma once
 
+#include "host_sim/portable_math.hpp"
+
 #include <cmath>
 #include <cstdint>
-
-#include "host_sim/portable_math.hpp"
 
 namespace moldloft::host_sim {
 

@@ -9,11 +9,12 @@
 // Allocation   none after reserve()
 #pragma once
 
+#include "host_sim/plate.hpp"
+
 #include <Eigen/Core>
+
 #include <span>
 #include <vector>
-
-#include "host_sim/plate.hpp"
 
 namespace moldloft::host_sim {
 

@@ -10,13 +10,13 @@
 // Failure      none of its own; what a host does wrong is answered by NAK or ERR
 #pragma once
 
-#include <array>
-#include <cstdint>
-#include <string_view>
-
 #include "hal/byte_link.hpp"
 #include "hal/robot_line.hpp"
 #include "host_sim/arm_drive.hpp"
+
+#include <array>
+#include <cstdint>
+#include <string_view>
 
 namespace moldloft::host_sim {
 

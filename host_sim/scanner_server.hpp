@@ -10,13 +10,13 @@
 // Failure      none of its own; what a client does wrong is answered by ERROR
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include "hal/byte_link.hpp"
 #include "hal/clock.hpp"
 #include "hal/psc1.hpp"
 #include "host_sim/optics.hpp"
+
+#include <cstdint>
+#include <vector>
 
 namespace moldloft::host_sim {
 

@@ -1,14 +1,14 @@
 #include "host_sim/simulated_run.hpp"
 
-#include <fmt/format.h>
-
-#include <cmath>
-
 #include "firmware_like/plate_name.hpp"
 #include "firmware_like/run_command.hpp"
 #include "hal/cable.hpp"
 #include "host_sim/cell_config.hpp"
 #include "host_sim/world_clock.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
 
 namespace moldloft::host_sim {
 namespace {

@@ -6,15 +6,15 @@
 // Failure      one line; a run that does not complete is no failure of the simulation: its summary says what happened
 #pragma once
 
-#include <expected>
-#include <filesystem>
-#include <functional>
-#include <optional>
-
 #include "firmware_like/results.hpp"
 #include "hal/cable.hpp"
 #include "host_sim/judge.hpp"
 #include "host_sim/world.hpp"
+
+#include <expected>
+#include <filesystem>
+#include <functional>
+#include <optional>
 
 namespace moldloft::host_sim {
 

@@ -1,13 +1,13 @@
 #include "host_sim/stl_reader.hpp"
 
+#include "host_sim/text_cursor.hpp"
+
 #include <fmt/format.h>
 
 #include <cstdint>
 #include <cstring>
 #include <limits>
 #include <optional>
-
-#include "host_sim/text_cursor.hpp"
 
 namespace moldloft::host_sim {
 

@@ -6,12 +6,12 @@
 // Failure      one line with file, line (text) or facet (binary), what is wrong and what to do
 #pragma once
 
+#include "host_sim/sim_error.hpp"
+#include "host_sim/triangle_mesh.hpp"
+
 #include <expected>
 #include <string>
 #include <string_view>
-
-#include "host_sim/sim_error.hpp"
-#include "host_sim/triangle_mesh.hpp"
 
 namespace moldloft::host_sim {
 

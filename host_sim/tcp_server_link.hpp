@@ -10,12 +10,12 @@
 // Failure      listen_on() says why a port cannot be had
 #pragma once
 
+#include "hal/byte_link.hpp"
+#include "host_sim/sim_error.hpp"
+
 #include <cstdint>
 #include <expected>
 #include <memory>
-
-#include "hal/byte_link.hpp"
-#include "host_sim/sim_error.hpp"
 
 namespace moldloft::host_sim {
 

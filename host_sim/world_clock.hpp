@@ -4,10 +4,10 @@
 // Blocking     never; paced by the wall clock, in the controller's sleep
 #pragma once
 
-#include <optional>
-
 #include "hal/clock.hpp"
 #include "host_sim/world.hpp"
+
+#include <optional>
 
 namespace moldloft::host_sim {
 

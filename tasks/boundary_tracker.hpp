@@ -12,18 +12,19 @@
 // Failure      TrackState::failed with a message that says what was seen and what to do
 #pragma once
 
-#include <Eigen/Core>
-#include <cstdint>
-#include <optional>
-#include <span>
-#include <string_view>
-#include <vector>
-
 #include "geometry/edges/boundary_view.hpp"
 #include "geometry/rigid_motion.hpp"
 #include "hal/fixed_text.hpp"
 #include "hal/realtime.hpp"
 #include "tasks/transition.hpp"
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
 
 namespace moldloft::tasks {
 

@@ -1,11 +1,11 @@
 #include "tasks/cell.hpp"
 
+#include "tasks/tool_pose.hpp"
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <numbers>
-
-#include "tasks/tool_pose.hpp"
 
 namespace moldloft::tasks {
 

@@ -11,11 +11,6 @@
 //              what is dangerous aborts it. why() says which and what to do, in one line
 #pragma once
 
-#include <atomic>
-#include <optional>
-#include <span>
-#include <vector>
-
 #include "hal/latest_value.hpp"
 #include "hal/realtime.hpp"
 #include "hal/recorder.hpp"
@@ -33,6 +28,11 @@
 #include "tasks/shot_sequence.hpp"
 #include "tasks/surface_task.hpp"
 #include "tasks/time_left.hpp"
+
+#include <atomic>
+#include <optional>
+#include <span>
+#include <vector>
 
 namespace moldloft::tasks {
 

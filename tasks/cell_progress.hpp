@@ -2,11 +2,11 @@
 // A plain value, trivially copyable, published once a tick.
 #pragma once
 
-#include <cstdint>
-
 #include "hal/clock.hpp"
 #include "hal/fixed_text.hpp"
 #include "tasks/cell_state.hpp"
+
+#include <cstdint>
 
 namespace moldloft::tasks {
 

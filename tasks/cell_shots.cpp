@@ -1,10 +1,10 @@
 // One shot after another: drive, expose, deliver; and the same from the archive.
+#include "tasks/cell.hpp"
+#include "tasks/tool_pose.hpp"
+
 #include <cmath>
 #include <numbers>
 #include <utility>
-
-#include "tasks/cell.hpp"
-#include "tasks/tool_pose.hpp"
 
 namespace moldloft::tasks {
 

@@ -2,12 +2,12 @@
 // table.
 #pragma once
 
+#include "hal/realtime.hpp"
+#include "tasks/transition.hpp"
+
 #include <cstdint>
 #include <span>
 #include <string_view>
-
-#include "hal/realtime.hpp"
-#include "tasks/transition.hpp"
 
 namespace moldloft::tasks {
 

@@ -6,11 +6,11 @@
 // Failure      fewer than three pairs, or no time between them: no estimate
 #pragma once
 
-#include <cstdint>
-#include <optional>
-
 #include "hal/clock.hpp"
 #include "hal/realtime.hpp"
+
+#include <cstdint>
+#include <optional>
 
 namespace moldloft::tasks {
 

@@ -1,10 +1,10 @@
 #include "tasks/motion_guard.hpp"
 
+#include "tasks/tool_pose.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-
-#include "tasks/tool_pose.hpp"
 
 namespace moldloft::tasks {
 namespace {

@@ -4,12 +4,12 @@
 // Units mm and rad, world frame. Pure, no allocation.
 #pragma once
 
-#include <array>
-#include <optional>
-
 #include "hal/fixed_text.hpp"
 #include "hal/pose.hpp"
 #include "hal/realtime.hpp"
+
+#include <array>
+#include <optional>
 
 namespace moldloft::tasks {
 

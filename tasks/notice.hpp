@@ -7,14 +7,14 @@
 // Failure      a full queue drops the newest: the run store has all of them
 #pragma once
 
+#include "hal/clock.hpp"
+#include "hal/fixed_text.hpp"
+
 #include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-
-#include "hal/clock.hpp"
-#include "hal/fixed_text.hpp"
 
 namespace moldloft::tasks {
 

@@ -8,17 +8,17 @@
 // Failure      geometry::Error::capacity when the plate needs more shots than the array holds
 #pragma once
 
-#include <array>
-#include <cstdint>
-#include <expected>
-#include <span>
-#include <utility>
-
 #include "geometry/edges/outline.hpp"
 #include "geometry/error.hpp"
 #include "hal/realtime.hpp"
 #include "tasks/boundary_tracker.hpp"
 #include "tasks/height_model.hpp"
+
+#include <array>
+#include <cstdint>
+#include <expected>
+#include <span>
+#include <utility>
 
 namespace moldloft::tasks {
 

@@ -21,15 +21,15 @@
 // Failure      add*() asserts on what check_table() (task.hpp) refuses: a table is known when the program is written
 #pragma once
 
+#include "hal/flight_recorder.hpp"
+#include "hal/realtime.hpp"
+#include "tasks/task_record.hpp"
+
 #include <array>
 #include <atomic>
 #include <cstdint>
 #include <span>
 #include <string_view>
-
-#include "hal/flight_recorder.hpp"
-#include "hal/realtime.hpp"
-#include "tasks/task_record.hpp"
 
 namespace moldloft::tasks {
 

@@ -5,11 +5,11 @@
 // Thread       the control thread; find() must not block or allocate (the shots are in memory before the run starts)
 #pragma once
 
-#include <cstdint>
-
 #include "hal/frame.hpp"
 #include "hal/realtime.hpp"
 #include "hal/run_record.hpp"
+
+#include <cstdint>
 
 namespace moldloft::tasks {
 

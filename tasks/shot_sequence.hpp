@@ -5,12 +5,12 @@
 // as soon as EXPOSED is seen (the arm is free then), the next exposure only when the frame before has arrived.
 #pragma once
 
+#include "hal/realtime.hpp"
+#include "tasks/transition.hpp"
+
 #include <cstdint>
 #include <span>
 #include <string_view>
-
-#include "hal/realtime.hpp"
-#include "tasks/transition.hpp"
 
 namespace moldloft::tasks {
 

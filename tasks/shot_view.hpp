@@ -7,13 +7,13 @@
 // Allocation   in the constructor only
 #pragma once
 
-#include <optional>
-#include <vector>
-
 #include "geometry/edges/boundary_view.hpp"
 #include "geometry/edges/plate_runs.hpp"
 #include "hal/realtime.hpp"
 #include "hal/scanner.hpp"
+
+#include <optional>
+#include <vector>
 
 namespace moldloft::tasks {
 

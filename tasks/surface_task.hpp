@@ -11,12 +11,6 @@
 // Failure      stage() turns failed and error() says why
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
-#include <expected>
-#include <span>
-#include <vector>
-
 #include "geometry/edges/corner_choice.hpp"
 #include "geometry/edges/outline.hpp"
 #include "geometry/fit/plan_map.hpp"
@@ -26,6 +20,13 @@
 #include "tasks/scan_plan.hpp"
 #include "tasks/scheduler.hpp"
 #include "tasks/shot_view.hpp"
+
+#include <Eigen/Core>
+
+#include <array>
+#include <expected>
+#include <span>
+#include <vector>
 
 namespace moldloft::tasks {
 

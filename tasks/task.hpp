@@ -7,14 +7,14 @@
 // Failure      check_table() names the flaw and the row
 #pragma once
 
+#include "hal/clock.hpp"
+#include "hal/realtime.hpp"
+
 #include <cstdint>
 #include <numeric>
 #include <optional>
 #include <span>
 #include <string_view>
-
-#include "hal/clock.hpp"
-#include "hal/realtime.hpp"
 
 namespace moldloft::tasks {
 

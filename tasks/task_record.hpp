@@ -4,10 +4,10 @@
 // Allocation   none
 #pragma once
 
-#include <cstdint>
-
 #include "tasks/histogram.hpp"
 #include "tasks/task.hpp"
+
+#include <cstdint>
 
 namespace moldloft::tasks {
 

@@ -12,13 +12,14 @@
 // Allocation   none
 #pragma once
 
-#include <Eigen/Core>
-#include <cstddef>
-
 #include "hal/realtime.hpp"
 #include "hal/run_record.hpp"
 #include "tasks/boundary_tracker.hpp"
 #include "tasks/scan_plan.hpp"
+
+#include <Eigen/Core>
+
+#include <cstddef>
 
 namespace moldloft::tasks {
 

@@ -1,6 +1,6 @@
-#include <array>
-
 #include "tasks/boundary_tracker.hpp"
+
+#include <array>
 
 namespace moldloft::tasks {
 namespace {

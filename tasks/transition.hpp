@@ -7,9 +7,9 @@
 // owner carries out.
 #pragma once
 
-#include <span>
-
 #include "hal/realtime.hpp"
+
+#include <span>
 
 namespace moldloft::tasks {
 

@@ -17,8 +17,8 @@ struct CadLabel {
   std::string name = "plate";    // of the product
   std::string description = {};  // one line: what it is and how exact
   std::vector<std::string> notes =
-      {};                        // further lines of that kind, each at most 256 characters (STEP's limit)
-  std::string file_name = {};    // as the file is called, without its folder
+      {};                      // further lines of that kind, each at most 256 characters (STEP's limit)
+  std::string file_name = {};  // as the file is called, without its folder
   std::string system = "Moldloft";
   std::string author = {}, organization = {};
   CadStamp stamp = {};

@@ -6,10 +6,10 @@
 // Failure      what check() of trimmed_surface.hpp finds
 #pragma once
 
+#include "geometry/splines/trimmed_surface.hpp"
+
 #include <expected>
 #include <vector>
-
-#include "geometry/splines/trimmed_surface.hpp"
 
 namespace moldloft::geometry {
 

@@ -1,12 +1,12 @@
 #include "geometry/cad/iges_writer.hpp"
 
+#include "geometry/cad/cad_text.hpp"
+#include "geometry/cad/face_edges.hpp"
+
 #include <algorithm>
 #include <cassert>
 #include <string_view>
 #include <utility>
-
-#include "geometry/cad/cad_text.hpp"
-#include "geometry/cad/face_edges.hpp"
 
 namespace moldloft::geometry {
 

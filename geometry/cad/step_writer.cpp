@@ -1,10 +1,10 @@
 #include "geometry/cad/step_writer.hpp"
 
-#include <initializer_list>
-#include <string_view>
-
 #include "geometry/cad/cad_text.hpp"
 #include "geometry/cad/face_edges.hpp"
+
+#include <initializer_list>
+#include <string_view>
 
 namespace moldloft::geometry {
 

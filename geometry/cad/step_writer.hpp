@@ -14,11 +14,11 @@
 // Failure      what check() of splines/trimmed_surface.hpp finds, impossible_setting: a closure_mm that is no length
 #pragma once
 
-#include <expected>
-#include <string>
-
 #include "geometry/cad/cad_label.hpp"
 #include "geometry/splines/trimmed_surface.hpp"
+
+#include <expected>
+#include <string>
 
 namespace moldloft::geometry {
 

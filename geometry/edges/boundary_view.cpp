@@ -1,11 +1,11 @@
 #include "geometry/edges/boundary_view.hpp"
 
+#include "geometry/edges/edge_lines.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
-
-#include "geometry/edges/edge_lines.hpp"
 
 // Vectors grow within what their constructor has reserved, which the compiler cannot know.
 MOLDLOFT_GEOMETRY_CHECKED_AT_RUN_TIME

@@ -14,14 +14,15 @@
 //              is empty
 #pragma once
 
+#include "geometry/edges/plate_runs.hpp"
+#include "geometry/nonblocking.hpp"
+
 #include <Eigen/Core>
+
 #include <array>
 #include <optional>
 #include <span>
 #include <vector>
-
-#include "geometry/edges/plate_runs.hpp"
-#include "geometry/nonblocking.hpp"
 
 namespace moldloft::geometry {
 

@@ -14,15 +14,16 @@
 //              points, capacity with more candidates than planned, not_finite when one of them is no number
 #pragma once
 
+#include "geometry/error.hpp"
+#include "geometry/nonblocking.hpp"
+
 #include <Eigen/Core>
+
 #include <array>
 #include <expected>
 #include <optional>
 #include <span>
 #include <vector>
-
-#include "geometry/error.hpp"
-#include "geometry/nonblocking.hpp"
 
 namespace moldloft::geometry {
 

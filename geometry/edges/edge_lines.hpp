@@ -6,10 +6,11 @@
 // Allocation   none
 #pragma once
 
-#include <Eigen/Core>
-#include <span>
-
 #include "geometry/edges/boundary_view.hpp"
+
+#include <Eigen/Core>
+
+#include <span>
 
 namespace moldloft::geometry {
 

@@ -13,17 +13,18 @@
 //              collinear (hints that span no area or go clockwise, sides that do not meet), capacity
 #pragma once
 
+#include "geometry/error.hpp"
+#include "geometry/nonblocking.hpp"
+#include "geometry/splines/bspline.hpp"
+
 #include <Eigen/Core>
+
 #include <array>
 #include <cstdint>
 #include <expected>
 #include <memory>
 #include <span>
 #include <vector>
-
-#include "geometry/error.hpp"
-#include "geometry/nonblocking.hpp"
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
 

@@ -1,11 +1,11 @@
 #include "geometry/edges/plate_runs.hpp"
 
+#include "geometry/edges/stripe_line.hpp"
+#include "geometry/edges/stripe_walk.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include "geometry/edges/stripe_line.hpp"
-#include "geometry/edges/stripe_walk.hpp"
 
 // Vectors grow within what their constructor has reserved, which the compiler cannot know.
 MOLDLOFT_GEOMETRY_CHECKED_AT_RUN_TIME

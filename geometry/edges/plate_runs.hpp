@@ -16,15 +16,16 @@
 //              capacity when the frame is larger than planned, sizes_differ when a stripe's columns do
 #pragma once
 
+#include "geometry/error.hpp"
+#include "geometry/nonblocking.hpp"
+#include "geometry/simd.hpp"
+
 #include <Eigen/Core>
+
 #include <cstdint>
 #include <expected>
 #include <span>
 #include <vector>
-
-#include "geometry/error.hpp"
-#include "geometry/nonblocking.hpp"
-#include "geometry/simd.hpp"
 
 namespace moldloft::geometry {
 

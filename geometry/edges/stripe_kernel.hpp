@@ -9,9 +9,9 @@
 // Allocation   none
 #pragma once
 
-#include <cstdint>
-
 #include "geometry/simd.hpp"
+
+#include <cstdint>
 
 namespace moldloft::geometry {
 

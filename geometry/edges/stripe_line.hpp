@@ -6,13 +6,13 @@
 // Allocation   none
 #pragma once
 
+#include "geometry/edges/plate_runs.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <span>
-
-#include "geometry/edges/plate_runs.hpp"
 
 namespace moldloft::geometry {
 

@@ -10,14 +10,14 @@
 //              for every `fewest_piece_points` points and one more
 #pragma once
 
+#include "geometry/edges/plate_runs.hpp"
+#include "geometry/edges/stripe_kernel.hpp"
+#include "geometry/edges/stripe_line.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
-
-#include "geometry/edges/plate_runs.hpp"
-#include "geometry/edges/stripe_kernel.hpp"
-#include "geometry/edges/stripe_line.hpp"
 
 namespace moldloft::geometry {
 

@@ -1,14 +1,15 @@
 #include "geometry/fit/bezier_surface_fit.hpp"
 
+#include "geometry/fit/matching_checks.hpp"
+#include "geometry/fit/stripe_matching.hpp"
+
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
-
-#include "geometry/fit/matching_checks.hpp"
-#include "geometry/fit/stripe_matching.hpp"
 
 namespace moldloft::geometry {
 

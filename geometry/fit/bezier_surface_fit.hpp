@@ -18,11 +18,12 @@
 //              condition if by QR)
 #pragma once
 
+#include "geometry/fit/matching_failure.hpp"
+
 #include <Eigen/Core>
+
 #include <expected>
 #include <span>
-
-#include "geometry/fit/matching_failure.hpp"
 
 namespace moldloft::geometry {
 

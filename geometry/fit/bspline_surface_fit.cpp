@@ -1,13 +1,13 @@
 #include "geometry/fit/bspline_surface_fit.hpp"
 
+#include "geometry/fit/matching_checks.hpp"
+#include "geometry/fit/stripe_matching.hpp"
+#include "geometry/splines/span_restriction.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
-
-#include "geometry/fit/matching_checks.hpp"
-#include "geometry/fit/stripe_matching.hpp"
-#include "geometry/splines/span_restriction.hpp"
 
 namespace moldloft::geometry {
 

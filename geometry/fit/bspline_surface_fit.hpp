@@ -15,15 +15,16 @@
 // Failure      MatchingFailure, which names the stripe or the control point
 #pragma once
 
-#include <Eigen/Core>
-#include <expected>
-#include <span>
-#include <vector>
-
 #include "geometry/fit/matching_failure.hpp"
 #include "geometry/fit/matching_system.hpp"
 #include "geometry/fit/stripe_pieces.hpp"
 #include "geometry/splines/bspline.hpp"
+
+#include <Eigen/Core>
+
+#include <expected>
+#include <span>
+#include <vector>
 
 namespace moldloft::geometry {
 

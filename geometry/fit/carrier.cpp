@@ -1,11 +1,11 @@
 #include "geometry/fit/carrier.hpp"
 
+#include "geometry/fit/smooth_sides.hpp"
+#include "geometry/splines/closed_polygon.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include "geometry/fit/smooth_sides.hpp"
-#include "geometry/splines/closed_polygon.hpp"
 
 namespace moldloft::geometry {
 

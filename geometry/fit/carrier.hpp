@@ -22,12 +22,12 @@
 //              that is not clamped
 #pragma once
 
+#include "geometry/edges/outline.hpp"
+#include "geometry/splines/trimmed_surface.hpp"
+
 #include <expected>
 #include <span>
 #include <vector>
-
-#include "geometry/edges/outline.hpp"
-#include "geometry/splines/trimmed_surface.hpp"
 
 namespace moldloft::geometry {
 

@@ -1,9 +1,9 @@
 #include "geometry/fit/cell_moments.hpp"
 
+#include "geometry/fit/moment_kernel.hpp"
+
 #include <algorithm>
 #include <cassert>
-
-#include "geometry/fit/moment_kernel.hpp"
 
 namespace moldloft::geometry {
 

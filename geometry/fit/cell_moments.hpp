@@ -8,13 +8,13 @@
 // Allocation   in the constructor only
 #pragma once
 
+#include "geometry/splines/bernstein.hpp"
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
-
-#include "geometry/splines/bernstein.hpp"
 
 namespace moldloft::geometry {
 

@@ -1,10 +1,10 @@
 #include "geometry/fit/fit_checks.hpp"
 
+#include <Eigen/Core>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
-
-#include <Eigen/Core>
 
 namespace moldloft::geometry {
 

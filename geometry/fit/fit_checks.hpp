@@ -5,10 +5,10 @@
 //              sizes_differ; too_large with the point; too_few_points; collinear
 #pragma once
 
-#include <expected>
-
 #include "geometry/fit/fit_surface.hpp"
 #include "geometry/fit/spline_net.hpp"
+
+#include <expected>
 
 namespace moldloft::geometry {
 

@@ -1,11 +1,11 @@
 #include "geometry/fit/fit_surface.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 #include "geometry/fit/fit_checks.hpp"
 #include "geometry/fit/robust_weights.hpp"
 #include "geometry/splines/band_condition.hpp"
+
+#include <algorithm>
+#include <cmath>
 
 namespace moldloft::geometry {
 

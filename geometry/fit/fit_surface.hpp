@@ -27,13 +27,13 @@
 //              knots.hpp
 #pragma once
 
-#include <expected>
-#include <optional>
-#include <vector>
-
 #include "geometry/fit/moment_accumulator.hpp"
 #include "geometry/fit/net_choice.hpp"
 #include "geometry/splines/bspline.hpp"
+
+#include <expected>
+#include <optional>
+#include <vector>
 
 namespace moldloft::geometry {
 

@@ -12,10 +12,10 @@
 // Failure      none here; a pre-image that leaves the domain is refused by assemble()
 #pragma once
 
+#include "geometry/fit/bspline_surface_fit.hpp"
+
 #include <span>
 #include <vector>
-
-#include "geometry/fit/bspline_surface_fit.hpp"
 
 namespace moldloft::geometry {
 

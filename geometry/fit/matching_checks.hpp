@@ -5,10 +5,10 @@
 //              too_few_points
 #pragma once
 
+#include "geometry/fit/bspline_surface_fit.hpp"
+
 #include <expected>
 #include <span>
-
-#include "geometry/fit/bspline_surface_fit.hpp"
 
 namespace moldloft::geometry {
 

@@ -2,9 +2,9 @@
 // act on.
 #pragma once
 
-#include <string>
-
 #include "geometry/error.hpp"
+
+#include <string>
 
 namespace moldloft::geometry {
 

@@ -7,11 +7,12 @@
 // Failure      singular: the control point that the rows leave free is named
 #pragma once
 
-#include <Eigen/Core>
-#include <expected>
-
 #include "geometry/fit/matching_failure.hpp"
 #include "geometry/splines/band_cholesky.hpp"
+
+#include <Eigen/Core>
+
+#include <expected>
 
 namespace moldloft::geometry {
 

@@ -16,16 +16,16 @@
 // Threads      one accumulator a thread
 #pragma once
 
-#include <cstddef>
-#include <expected>
-#include <memory>
-#include <span>
-
 #include "geometry/error.hpp"
 #include "geometry/fit/cell_moments.hpp"
 #include "geometry/fit/net_solver.hpp"
 #include "geometry/fit/point_columns.hpp"
 #include "geometry/splines/knot_cells.hpp"
+
+#include <cstddef>
+#include <expected>
+#include <memory>
+#include <span>
 
 namespace moldloft::geometry {
 

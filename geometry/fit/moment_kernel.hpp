@@ -12,11 +12,11 @@
 // Allocation   none
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-
 #include "geometry/fit/cell_moments.hpp"
 #include "geometry/simd.hpp"
+
+#include <cstddef>
+#include <cstdint>
 
 namespace moldloft::geometry {
 

@@ -6,11 +6,11 @@
 //              what the coarser net misses: the coarsest net within tolerance^2 of the best is taken
 #pragma once
 
+#include "geometry/fit/net_solver.hpp"
+
 #include <cmath>
 #include <limits>
 #include <span>
-
-#include "geometry/fit/net_solver.hpp"
 
 namespace moldloft::geometry {
 

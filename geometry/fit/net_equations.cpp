@@ -1,9 +1,9 @@
 #include "geometry/fit/net_equations.hpp"
 
+#include "geometry/splines/gauss_nodes.hpp"
+
 #include <algorithm>
 #include <cassert>
-
-#include "geometry/splines/gauss_nodes.hpp"
 
 namespace moldloft::geometry {
 

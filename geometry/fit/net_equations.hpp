@@ -11,13 +11,14 @@
 // Failure      solve() returns false where a pivot is not positive
 #pragma once
 
+#include "geometry/splines/band_cholesky.hpp"
+#include "geometry/splines/bspline.hpp"
+
 #include <Eigen/Core>
+
 #include <array>
 #include <span>
 #include <vector>
-
-#include "geometry/splines/band_cholesky.hpp"
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
 

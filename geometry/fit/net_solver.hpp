@@ -12,16 +12,16 @@
 //              is larger than the constructor was told; too_large where a sum overflows
 #pragma once
 
+#include "geometry/error.hpp"
+#include "geometry/fit/shot_offsets.hpp"
+#include "geometry/fit/spline_net.hpp"
+#include "geometry/splines/band_cholesky.hpp"
+
 #include <cstdint>
 #include <expected>
 #include <limits>
 #include <span>
 #include <vector>
-
-#include "geometry/error.hpp"
-#include "geometry/fit/shot_offsets.hpp"
-#include "geometry/fit/spline_net.hpp"
-#include "geometry/splines/band_cholesky.hpp"
 
 namespace moldloft::geometry {
 

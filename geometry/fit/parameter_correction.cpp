@@ -1,12 +1,13 @@
 #include "geometry/fit/parameter_correction.hpp"
 
+#include "geometry/fit/net_equations.hpp"
+
 #include <Eigen/LU>
+
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <optional>
-
-#include "geometry/fit/net_equations.hpp"
 
 namespace moldloft::geometry {
 

@@ -30,15 +30,16 @@
 //              over 3), singular (a control point that no point sees, without fairing)
 #pragma once
 
+#include "geometry/error.hpp"
+#include "geometry/splines/bspline.hpp"
+
 #include <Eigen/Core>
+
 #include <cstdint>
 #include <expected>
 #include <span>
 #include <string_view>
 #include <vector>
-
-#include "geometry/error.hpp"
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
 

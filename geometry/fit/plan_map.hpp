@@ -16,15 +16,16 @@
 // Expects      sides that share one uniform clamped knot vector, as OutlineBuilder makes them
 #pragma once
 
+#include "geometry/edges/outline.hpp"
+#include "geometry/nonblocking.hpp"
+#include "geometry/simd.hpp"
+
 #include <Eigen/Core>
+
 #include <array>
 #include <expected>
 #include <span>
 #include <vector>
-
-#include "geometry/edges/outline.hpp"
-#include "geometry/nonblocking.hpp"
-#include "geometry/simd.hpp"
 
 namespace moldloft::geometry {
 

@@ -15,12 +15,13 @@
 // Allocation   in the constructor only
 #pragma once
 
+#include "geometry/fit/spline_net.hpp"
+
 #include <Eigen/Core>
+
 #include <cstdint>
 #include <span>
 #include <vector>
-
-#include "geometry/fit/spline_net.hpp"
 
 namespace moldloft::geometry {
 

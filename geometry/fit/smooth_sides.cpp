@@ -1,9 +1,9 @@
 #include "geometry/fit/smooth_sides.hpp"
 
+#include "geometry/splines/closed_polygon.hpp"
+
 #include <algorithm>
 #include <cmath>
-
-#include "geometry/splines/closed_polygon.hpp"
 
 namespace moldloft::geometry {
 

@@ -14,12 +14,12 @@
 // Failure      too_few_points: fewer than three points that differ from their neighbours; not_finite
 #pragma once
 
+#include "geometry/error.hpp"
+#include "geometry/splines/bspline.hpp"
+
 #include <expected>
 #include <span>
 #include <vector>
-
-#include "geometry/error.hpp"
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
 

@@ -1,10 +1,10 @@
 #include "geometry/fit/spline_net.hpp"
 
-#include <algorithm>
-#include <cassert>
-
 #include "geometry/splines/bspline.hpp"
 #include "geometry/splines/gauss_nodes.hpp"
+
+#include <algorithm>
+#include <cassert>
 
 namespace moldloft::geometry {
 

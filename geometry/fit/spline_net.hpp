@@ -10,14 +10,14 @@
 // Allocation   in the constructor only
 #pragma once
 
+#include "geometry/fit/moment_kernel.hpp"
+#include "geometry/splines/band_cholesky.hpp"
+#include "geometry/splines/knot_cells.hpp"
+
 #include <algorithm>
 #include <array>
 #include <span>
 #include <vector>
-
-#include "geometry/fit/moment_kernel.hpp"
-#include "geometry/splines/band_cholesky.hpp"
-#include "geometry/splines/knot_cells.hpp"
 
 namespace moldloft::geometry {
 

@@ -12,13 +12,14 @@
 //              (u, v) that go backwards along the pre-image)
 #pragma once
 
+#include "geometry/fit/bspline_surface_fit.hpp"
+#include "geometry/splines/curve_fit.hpp"
+
 #include <Eigen/Core>
+
 #include <expected>
 #include <span>
 #include <vector>
-
-#include "geometry/fit/bspline_surface_fit.hpp"
-#include "geometry/splines/curve_fit.hpp"
 
 namespace moldloft::geometry {
 

@@ -1,10 +1,10 @@
 #include "geometry/fit/stripe_matching.hpp"
 
-#include <array>
-#include <cassert>
-
 #include "geometry/splines/bernstein.hpp"
 #include "geometry/splines/bernstein_form.hpp"
+
+#include <array>
+#include <cassert>
 
 namespace moldloft::geometry {
 

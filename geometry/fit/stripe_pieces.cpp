@@ -1,10 +1,10 @@
 #include "geometry/fit/stripe_pieces.hpp"
 
+#include "geometry/splines/bspline.hpp"
+
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
 

@@ -9,12 +9,13 @@
 // Failure      not_finite, knots_not_increasing, no_length, preimage_outside
 #pragma once
 
+#include "geometry/error.hpp"
+
 #include <Eigen/Core>
+
 #include <expected>
 #include <span>
 #include <vector>
-
-#include "geometry/error.hpp"
 
 namespace moldloft::geometry {
 

@@ -1,14 +1,14 @@
 #include "geometry/fit/surface_fit.hpp"
 
+#include "geometry/fit/net_choice.hpp"
+#include "geometry/fit/net_solver.hpp"
+
 #include <algorithm>
 #include <bit>
 #include <cassert>
 #include <cmath>
 #include <limits>
 #include <vector>
-
-#include "geometry/fit/net_choice.hpp"
-#include "geometry/fit/net_solver.hpp"
 
 // Blocks of matrices whose sizes were fixed in the constructor, vectors that grow within what was reserved there: the
 // compiler cannot know.

@@ -14,15 +14,15 @@
 // Failure      Error::capacity, singular, not_finite, too_few_points
 #pragma once
 
-#include <cstdint>
-#include <expected>
-#include <memory>
-#include <span>
-
 #include "geometry/error.hpp"
 #include "geometry/fit/plan_map.hpp"
 #include "geometry/nonblocking.hpp"
 #include "geometry/splines/bspline.hpp"
+
+#include <cstdint>
+#include <expected>
+#include <memory>
+#include <span>
 
 namespace moldloft::geometry {
 

@@ -21,14 +21,15 @@
 //              and capacity from the map
 #pragma once
 
+#include "geometry/error.hpp"
+#include "geometry/splines/bspline.hpp"
+
 #include <Eigen/Core>
+
 #include <cmath>
 #include <cstddef>
 #include <expected>
 #include <span>
-
-#include "geometry/error.hpp"
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
 

@@ -1,11 +1,11 @@
 #include "geometry/inspection/deviation.hpp"
 
+#include "geometry/inspection/plain_motion.hpp"
+
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>
-
-#include "geometry/inspection/plain_motion.hpp"
 
 namespace moldloft::geometry {
 

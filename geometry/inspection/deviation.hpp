@@ -17,14 +17,14 @@
 //              sizes_differ: fewer places than points, and nothing has been written
 #pragma once
 
+#include "geometry/inspection/foot_point.hpp"
+#include "geometry/inspection/inspection_error.hpp"
+#include "geometry/rigid_motion.hpp"
+
 #include <array>
 #include <cstdint>
 #include <expected>
 #include <span>
-
-#include "geometry/inspection/foot_point.hpp"
-#include "geometry/inspection/inspection_error.hpp"
-#include "geometry/rigid_motion.hpp"
 
 namespace moldloft::geometry {
 

@@ -24,10 +24,11 @@
 //              distances and gap are infinite
 #pragma once
 
-#include <Eigen/Core>
-#include <cstdint>
-
 #include "geometry/inspection/prepared_surface.hpp"
+
+#include <Eigen/Core>
+
+#include <cstdint>
 
 namespace moldloft::geometry {
 

@@ -1,10 +1,10 @@
 // What is wrong with measured points, and with which one.
 #pragma once
 
+#include "geometry/error.hpp"
+
 #include <cstddef>
 #include <limits>
-
-#include "geometry/error.hpp"
 
 namespace moldloft::geometry {
 

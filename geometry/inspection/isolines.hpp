@@ -21,7 +21,11 @@
 //              light without direction)
 #pragma once
 
+#include "geometry/error.hpp"
+#include "geometry/splines/bspline.hpp"
+
 #include <Eigen/Core>
+
 #include <algorithm>
 #include <cmath>
 #include <concepts>
@@ -30,9 +34,6 @@
 #include <limits>
 #include <span>
 #include <vector>
-
-#include "geometry/error.hpp"
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
 

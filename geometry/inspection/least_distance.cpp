@@ -1,6 +1,7 @@
 #include "geometry/inspection/least_distance.hpp"
 
 #include <Eigen/QR>
+
 #include <algorithm>
 #include <cassert>
 #include <cmath>

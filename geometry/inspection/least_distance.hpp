@@ -13,6 +13,7 @@
 #pragma once
 
 #include <Eigen/Core>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>

@@ -1,6 +1,7 @@
 #include "geometry/inspection/localization.hpp"
 
 #include <Eigen/Cholesky>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>

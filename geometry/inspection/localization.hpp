@@ -29,14 +29,14 @@
 //              not_converged, impossible_setting (a negative tolerance, a start that is no rigid motion)
 #pragma once
 
+#include "geometry/inspection/inspection_error.hpp"
+#include "geometry/inspection/point_plane_system.hpp"
+#include "geometry/inspection/prepared_surface.hpp"
+
 #include <array>
 #include <cstddef>
 #include <expected>
 #include <span>
-
-#include "geometry/inspection/inspection_error.hpp"
-#include "geometry/inspection/point_plane_system.hpp"
-#include "geometry/inspection/prepared_surface.hpp"
 
 namespace moldloft::geometry {
 

@@ -1,9 +1,10 @@
 #include "geometry/inspection/point_plane_system.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <cmath>
-
 #include "geometry/inspection/plain_motion.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include <cmath>
 
 namespace moldloft::geometry {
 

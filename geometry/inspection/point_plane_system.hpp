@@ -12,14 +12,14 @@
 // Determinism  sums run in the order of the points
 #pragma once
 
+#include "geometry/inspection/foot_point.hpp"
+#include "geometry/inspection/least_distance.hpp"
+#include "geometry/rigid_motion.hpp"
+
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
-
-#include "geometry/inspection/foot_point.hpp"
-#include "geometry/inspection/least_distance.hpp"
-#include "geometry/rigid_motion.hpp"
 
 namespace moldloft::geometry {
 

@@ -1,11 +1,11 @@
 #include "geometry/inspection/prepared_surface.hpp"
 
+#include "geometry/inspection/foot_point.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-
-#include "geometry/inspection/foot_point.hpp"
 
 namespace moldloft::geometry {
 

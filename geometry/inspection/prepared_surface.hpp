@@ -14,15 +14,15 @@
 //              does not fit its knots)
 #pragma once
 
-#include <cstddef>
-#include <expected>
-#include <span>
-#include <vector>
-
 #include "geometry/error.hpp"
 #include "geometry/inspection/span_polynomial.hpp"
 #include "geometry/splines/bspline.hpp"
 #include "geometry/splines/knot_cells.hpp"
+
+#include <cstddef>
+#include <expected>
+#include <span>
+#include <vector>
 
 namespace moldloft::geometry {
 

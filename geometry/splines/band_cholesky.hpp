@@ -10,12 +10,13 @@
 // Failure      factor() returns false at a pivot that is not positive, and failed_column() says where
 #pragma once
 
+#include "geometry/splines/band_kernel.hpp"
+
 #include <Eigen/Core>
+
 #include <cstddef>
 #include <span>
 #include <vector>
-
-#include "geometry/splines/band_kernel.hpp"
 
 namespace moldloft::geometry {
 

@@ -6,10 +6,11 @@
 // Allocation   three vectors of the matrix's size
 #pragma once
 
-#include <Eigen/Core>
-#include <cmath>
-
 #include "geometry/splines/band_cholesky.hpp"
+
+#include <Eigen/Core>
+
+#include <cmath>
 
 namespace moldloft::geometry {
 

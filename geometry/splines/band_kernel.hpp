@@ -11,9 +11,9 @@
 // Allocation   none
 #pragma once
 
-#include <cstddef>
-
 #include "geometry/simd.hpp"
+
+#include <cstddef>
 
 namespace moldloft::geometry {
 

@@ -12,12 +12,13 @@
 // Failure      Error::singular from solve(): a pivot below unknowns * eps of the largest; pivots() says which
 #pragma once
 
+#include "geometry/error.hpp"
+
 #include <Eigen/Core>
+
 #include <expected>
 #include <span>
 #include <vector>
-
-#include "geometry/error.hpp"
 
 namespace moldloft::geometry {
 

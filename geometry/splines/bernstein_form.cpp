@@ -1,11 +1,11 @@
 #include "geometry/splines/bernstein_form.hpp"
 
+#include "geometry/splines/bernstein.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cassert>
 #include <cstdint>
-
-#include "geometry/splines/bernstein.hpp"
 
 namespace moldloft::geometry {
 

@@ -1,11 +1,11 @@
 #include "geometry/splines/bezier.hpp"
 
+#include "geometry/splines/bernstein.hpp"
+#include "geometry/splines/tensor_point.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cassert>
-
-#include "geometry/splines/bernstein.hpp"
-#include "geometry/splines/tensor_point.hpp"
 
 namespace moldloft::geometry {
 

@@ -9,11 +9,12 @@
 // Failure      none; degrees to most_bernstein_degree (asserted)
 #pragma once
 
-#include <Eigen/Core>
-#include <vector>
-
 #include "geometry/splines/bernstein_form.hpp"
 #include "geometry/splines/bspline.hpp"
+
+#include <Eigen/Core>
+
+#include <vector>
 
 namespace moldloft::geometry {
 

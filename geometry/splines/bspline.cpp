@@ -1,11 +1,11 @@
 #include "geometry/splines/bspline.hpp"
 
+#include "geometry/splines/tensor_point.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cassert>
 #include <cstring>
-
-#include "geometry/splines/tensor_point.hpp"
 
 namespace moldloft::geometry {
 

@@ -12,13 +12,14 @@
 //              most_spline_degree
 #pragma once
 
-#include <Eigen/Geometry>
-#include <span>
-#include <vector>
-
 #include "geometry/nonblocking.hpp"
 #include "geometry/splines/bspline_basis.hpp"
 #include "geometry/splines/knots.hpp"
+
+#include <Eigen/Geometry>
+
+#include <span>
+#include <vector>
 
 namespace moldloft::geometry {
 

@@ -11,11 +11,12 @@
 // Allocation   none, but for the matrix that piece_extraction() returns
 #pragma once
 
+#include "geometry/splines/knots.hpp"
+
 #include <Eigen/Core>
+
 #include <array>
 #include <span>
-
-#include "geometry/splines/knots.hpp"
 
 namespace moldloft::geometry {
 

@@ -1,8 +1,8 @@
 #include "geometry/splines/coons_patch.hpp"
 
-#include <algorithm>
-
 #include "geometry/splines/refinement.hpp"
+
+#include <algorithm>
 
 namespace moldloft::geometry {
 

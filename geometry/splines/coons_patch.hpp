@@ -13,10 +13,10 @@
 // Failure      CoonsError: what check() finds in a curve, or corners_apart
 #pragma once
 
+#include "geometry/splines/bspline.hpp"
+
 #include <array>
 #include <expected>
-
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
 

@@ -11,13 +11,13 @@
 // Failure      CurveFitError; see there
 #pragma once
 
-#include <expected>
-#include <span>
-#include <vector>
-
 #include "geometry/error.hpp"
 #include "geometry/splines/banded_least_squares.hpp"
 #include "geometry/splines/bspline.hpp"
+
+#include <expected>
+#include <span>
+#include <vector>
 
 namespace moldloft::geometry {
 

@@ -8,13 +8,13 @@
 // Expects      knots that pass check_knots() for a cubic (or `degree`)
 #pragma once
 
+#include "geometry/splines/knots.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <span>
 #include <vector>
-
-#include "geometry/splines/knots.hpp"
 
 namespace moldloft::geometry {
 
@@ -55,9 +55,7 @@ class KnotCells {
   // The place in the cell, 0..1.
   double local(int cell, double t) const { return (t - begin_of(cell)) / (end_of(cell) - begin_of(cell)); }
 
-  std::size_t bytes() const {
-    return breaks_.capacity() * sizeof(double) + start_.capacity() * sizeof(int);
-  }
+  std::size_t bytes() const { return breaks_.capacity() * sizeof(double) + start_.capacity() * sizeof(int); }
 
  private:
   std::vector<double> breaks_;

@@ -8,12 +8,12 @@
 //              it
 #pragma once
 
+#include "geometry/error.hpp"
+#include "geometry/nonblocking.hpp"
+
 #include <expected>
 #include <span>
 #include <vector>
-
-#include "geometry/error.hpp"
-#include "geometry/nonblocking.hpp"
 
 namespace moldloft::geometry {
 

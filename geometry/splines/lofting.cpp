@@ -1,11 +1,11 @@
 #include "geometry/splines/lofting.hpp"
 
+#include "geometry/splines/curve_fit.hpp"
+#include "geometry/splines/derived_curves.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-
-#include "geometry/splines/curve_fit.hpp"
-#include "geometry/splines/derived_curves.hpp"
 
 namespace moldloft::geometry {
 

@@ -14,13 +14,13 @@
 // Failure      LoftError; see there
 #pragma once
 
-#include <expected>
-#include <span>
-#include <vector>
-
 #include "geometry/error.hpp"
 #include "geometry/splines/banded_least_squares.hpp"
 #include "geometry/splines/bspline.hpp"
+
+#include <expected>
+#include <span>
+#include <vector>
 
 namespace moldloft::geometry {
 

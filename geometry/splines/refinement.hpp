@@ -13,11 +13,12 @@
 // Failure      none; knots must pass check_knots(), new ones lie in the domain (asserted)
 #pragma once
 
+#include "geometry/splines/bspline.hpp"
+
 #include <Eigen/Core>
+
 #include <span>
 #include <vector>
-
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
 

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <Eigen/Core>
+
 #include <span>
 
 namespace moldloft::geometry {

@@ -14,12 +14,13 @@
 //              not_finite, repeated_points. Stripes that find no partner are no error: they are counted.
 #pragma once
 
+#include "geometry/error.hpp"
+
 #include <Eigen/Geometry>
+
 #include <expected>
 #include <span>
 #include <vector>
-
-#include "geometry/error.hpp"
 
 namespace moldloft::geometry {
 

@@ -5,9 +5,9 @@
 // Allocation   none
 #pragma once
 
-#include <Eigen/Core>
-
 #include "geometry/splines/bspline.hpp"
+
+#include <Eigen/Core>
 
 namespace moldloft::geometry {
 

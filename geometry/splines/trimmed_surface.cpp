@@ -1,9 +1,9 @@
 #include "geometry/splines/trimmed_surface.hpp"
 
+#include "geometry/splines/closed_polygon.hpp"
+
 #include <algorithm>
 #include <cmath>
-
-#include "geometry/splines/closed_polygon.hpp"
 
 namespace moldloft::geometry {
 

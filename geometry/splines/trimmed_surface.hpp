@@ -12,12 +12,12 @@
 // Failure      check() names what is wrong: see there
 #pragma once
 
+#include "geometry/error.hpp"
+#include "geometry/splines/bspline.hpp"
+
 #include <expected>
 #include <optional>
 #include <vector>
-
-#include "geometry/error.hpp"
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry {
 

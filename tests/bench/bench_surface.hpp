@@ -3,12 +3,12 @@
 // machine.
 #pragma once
 
+#include "geometry/rigid_motion.hpp"
+#include "geometry/splines/bspline.hpp"
+
 #include <cmath>
 #include <cstdint>
 #include <vector>
-
-#include "geometry/rigid_motion.hpp"
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::bench {
 

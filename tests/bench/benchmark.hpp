@@ -6,6 +6,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+
 #include <string_view>
 
 namespace moldloft::bench {

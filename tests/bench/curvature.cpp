@@ -1,15 +1,16 @@
 // moldloft-bench curvature: what it costs to look at a surface (curvature map, contours, isophotes) and to
 // fit one whose parameters are not known (parameter correction).
-#include <fmt/core.h>
-
-#include <cmath>
-#include <numbers>
+#include "geometry/inspection/curvature.hpp"
 
 #include "bench/benchmark.hpp"
 #include "bench/stopwatch.hpp"
 #include "geometry/fit/parameter_correction.hpp"
-#include "geometry/inspection/curvature.hpp"
 #include "geometry/inspection/isolines.hpp"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <numbers>
 
 namespace moldloft::bench {
 

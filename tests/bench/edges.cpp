@@ -1,14 +1,5 @@
 // moldloft-bench edges: the plate's edge in one shot. Ours (runs, boundary, line) beside the floor: reading
 // the frame, and the largest second difference of every stripe, the least that an edge detector can do.
-#include <fmt/core.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <numbers>
-#include <random>
-#include <vector>
-
 #include "bench/benchmark.hpp"
 #include "bench/stopwatch.hpp"
 #include "geometry/edges/boundary_view.hpp"
@@ -18,6 +9,15 @@
 #include "geometry/edges/stripe_scene.hpp"
 #include "geometry/fit/plan_map.hpp"
 #include "geometry/outline_shapes.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <vector>
 
 namespace moldloft::bench {
 

@@ -1,17 +1,17 @@
 // moldloft-bench fit: the surface fit beside its floors and its peers, on fit job P.
-#include <fmt/core.h>
-#include <sys/resource.h>
-
-#include <cmath>
-#include <optional>
-#include <thread>
-
 #include "bench/benchmark.hpp"
 #include "bench/fit_job.hpp"
 #include "bench/fitpack.hpp"
 #include "bench/native/fit_native.hpp"
 #include "bench/stopwatch.hpp"
 #include "geometry/fit/fit_surface.hpp"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <optional>
+#include <sys/resource.h>
+#include <thread>
 
 namespace moldloft::bench {
 

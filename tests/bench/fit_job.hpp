@@ -3,11 +3,11 @@
 // every machine with IEEE doubles and the same sine.
 #pragma once
 
+#include "geometry/splines/bspline.hpp"
+
 #include <cstdint>
 #include <span>
 #include <vector>
-
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::bench {
 

@@ -2,10 +2,10 @@
 // columns from a file and takes the time of its own call.
 #pragma once
 
+#include "bench/fit_job.hpp"
+
 #include <filesystem>
 #include <optional>
-
-#include "bench/fit_job.hpp"
 
 namespace moldloft::bench {
 

@@ -1,13 +1,13 @@
 // Localization and deviation maps: a CMM's 1,169 points and a scanner's 450,000 on the 23 x 23 plate.
-#include <fmt/core.h>
-
-#include <algorithm>
-
 #include "bench/bench_surface.hpp"
 #include "bench/benchmark.hpp"
 #include "bench/stopwatch.hpp"
 #include "geometry/inspection/deviation.hpp"
 #include "geometry/inspection/localization.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
 
 namespace moldloft::bench {
 

@@ -1,8 +1,11 @@
 // moldloft-bench NAME: speeds side by side with peers and limits, in one run. Not a test: nothing here passes
 // or fails, and nothing in continuous integration depends on it.
-#include <fmt/core.h>
+#include "bench/benchmark.hpp"
+#include "firmware_like/build_info.hpp"
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
+
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -11,9 +14,6 @@
 #include <span>
 #include <system_error>
 #include <vector>
-
-#include "bench/benchmark.hpp"
-#include "firmware_like/build_info.hpp"
 
 namespace moldloft::bench {
 

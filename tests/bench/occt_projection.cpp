@@ -2,6 +2,8 @@
 
 #ifdef MOLDLOFT_HAS_OCCT
 
+#include "bench/stopwatch.hpp"
+
 #include <Extrema_ExtPS.hxx>
 #include <GeomAdaptor_Surface.hxx>
 #include <Geom_BSplineSurface.hxx>
@@ -9,10 +11,9 @@
 #include <TColStd_Array1OfInteger.hxx>
 #include <TColStd_Array1OfReal.hxx>
 #include <TColgp_Array2OfPnt.hxx>
+
 #include <algorithm>
 #include <cmath>
-
-#include "bench/stopwatch.hpp"
 
 namespace moldloft::bench {
 

@@ -1,10 +1,10 @@
 // OpenCASCADE's two ways to project points on a surface, timed where it is installed.
 #pragma once
 
+#include "geometry/inspection/prepared_surface.hpp"
+
 #include <optional>
 #include <span>
-
-#include "geometry/inspection/prepared_surface.hpp"
 
 namespace moldloft::bench {
 

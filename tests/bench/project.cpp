@@ -1,13 +1,13 @@
 // Foot points: 1,169 points on the 23 x 23 plate, with the plan view's guess and from nowhere.
-#include <fmt/core.h>
-
-#include <algorithm>
-
 #include "bench/bench_surface.hpp"
 #include "bench/benchmark.hpp"
 #include "bench/occt_projection.hpp"
 #include "bench/stopwatch.hpp"
 #include "geometry/inspection/foot_point.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
 
 namespace moldloft::bench {
 

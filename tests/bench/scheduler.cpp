@@ -1,13 +1,14 @@
 // moldloft-bench scheduler: what a tick costs beside its tasks, next to one read of the clock in the same run.
+#include "tasks/scheduler.hpp"
+
+#include "bench/benchmark.hpp"
+#include "bench/stopwatch.hpp"
+
 #include <fmt/core.h>
 
 #include <array>
 #include <memory>
 #include <vector>
-
-#include "bench/benchmark.hpp"
-#include "bench/stopwatch.hpp"
-#include "tasks/scheduler.hpp"
 
 namespace moldloft::bench {
 

@@ -1,14 +1,14 @@
 #include "bench/thesis_parts.hpp"
 
+#include "geometry/splines/coons_patch.hpp"
+#include "geometry/splines/derived_curves.hpp"
+
 #include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <string>
-
-#include "geometry/splines/coons_patch.hpp"
-#include "geometry/splines/derived_curves.hpp"
 
 namespace moldloft::bench {
 

@@ -2,16 +2,17 @@
 // far a reconstruction is from the truth.
 #pragma once
 
-#include <Eigen/Core>
-#include <functional>
-#include <span>
-#include <string>
-#include <vector>
-
 #include "bench/benchmark.hpp"
 #include "geometry/fit/bspline_surface_fit.hpp"
 #include "geometry/fit/stripe_curve.hpp"
 #include "geometry/splines/bspline.hpp"
+
+#include <Eigen/Core>
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
 
 namespace moldloft::bench {
 

@@ -1,16 +1,16 @@
 // Section 6.4, the plate: nine shots, 54 stripes as cubic Bezier curves, boundary curves of 8 control points,
 // 25 patches, and 1,169 points of a coordinate measuring machine to compare with.
+#include "bench/thesis.hpp"
+#include "bench/thesis_simulated_plate.hpp"
+#include "geometry/fit/plan_map.hpp"
+#include "geometry/splines/coons_patch.hpp"
+
 #include <fmt/core.h>
 
 #include <array>
 #include <cmath>
 #include <random>
 #include <string>
-
-#include "bench/thesis.hpp"
-#include "bench/thesis_simulated_plate.hpp"
-#include "geometry/fit/plan_map.hpp"
-#include "geometry/splines/coons_patch.hpp"
 
 namespace moldloft::bench {
 

@@ -1,14 +1,14 @@
 // Sections 6.3 and 6.4: the car hood and the fuselage. The thesis prints how many curves, pieces and knots
 // there are, not the control nets; these are stand-ins of the same structure, so that the errors can be known
 // at all.
+#include "bench/thesis.hpp"
+#include "bench/thesis_parts.hpp"
+
 #include <fmt/core.h>
 
 #include <cmath>
 #include <numbers>
 #include <string>
-
-#include "bench/thesis.hpp"
-#include "bench/thesis_parts.hpp"
 
 namespace moldloft::bench {
 

@@ -2,10 +2,11 @@
 // and the stripes, not the measured points.
 #pragma once
 
-#include <Eigen/Core>
-#include <vector>
-
 #include "bench/thesis_parts.hpp"
+
+#include <Eigen/Core>
+
+#include <vector>
 
 namespace moldloft::bench {
 

@@ -1,11 +1,11 @@
 // Table 6.3: a bicubic B-spline surface of 64 to 529 control points through 74 stripes, boundary given.
-#include <fmt/core.h>
-
-#include <array>
-
 #include "bench/stopwatch.hpp"
 #include "bench/thesis.hpp"
 #include "bench/thesis_simulated_plate.hpp"
+
+#include <fmt/core.h>
+
+#include <array>
 
 namespace moldloft::bench {
 

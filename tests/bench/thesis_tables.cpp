@@ -1,15 +1,4 @@
 // Tables 6.1 and 6.2: one Bezier patch through 54 stripes, by the six nested loops and by restricted bases.
-#include <fmt/core.h>
-
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
-#include <array>
-#include <chrono>
-#include <cmath>
-#include <optional>
-#include <tuple>
-#include <vector>
-
 #include "bench/literal_matching.hpp"
 #include "bench/stopwatch.hpp"
 #include "bench/thesis.hpp"
@@ -17,6 +6,17 @@
 #include "geometry/fit/bezier_surface_fit.hpp"
 #include "geometry/fit/stripe_matching.hpp"
 #include "geometry/splines/bernstein_form.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <fmt/core.h>
+
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <tuple>
+#include <vector>
 
 namespace moldloft::bench {
 

@@ -1,14 +1,14 @@
 // Section 6.2.1, the wave-like surface: how the stripes are parametrized decides, not the algebra.
+#include "bench/thesis.hpp"
+#include "bench/thesis_parts.hpp"
+#include "geometry/fit/parameter_correction.hpp"
+#include "geometry/fit/plan_map.hpp"
+
 #include <fmt/core.h>
 
 #include <cmath>
 #include <numbers>
 #include <string>
-
-#include "bench/thesis.hpp"
-#include "bench/thesis_parts.hpp"
-#include "geometry/fit/parameter_correction.hpp"
-#include "geometry/fit/plan_map.hpp"
 
 namespace moldloft::bench {
 

@@ -1,11 +1,12 @@
 // A CAD file as OpenCASCADE understands it.
 #pragma once
 
+#include "geometry/splines/bspline.hpp"
+
 #include <Eigen/Core>
+
 #include <string>
 #include <vector>
-
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::referee {
 

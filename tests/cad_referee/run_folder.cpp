@@ -1,11 +1,11 @@
 // The CAD files that a run of the whole cell leaves, read by OpenCASCADE.
-#include <doctest/doctest.h>
-
 #include "cad_referee/occt_face.hpp"
 #include "firmware_like/surface_file.hpp"
 #include "geometry/cad/face_quadrature.hpp"
 #include "hal/temporary_folder.hpp"
 #include "host_sim/simulated_run.hpp"
+
+#include <doctest/doctest.h>
 
 using namespace moldloft;
 

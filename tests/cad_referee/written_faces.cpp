@@ -1,9 +1,4 @@
 // STEP and IGES files of ours, read by OpenCASCADE.
-#include <doctest/doctest.h>
-
-#include <fstream>
-#include <limits>
-
 #include "cad_referee/occt_face.hpp"
 #include "geometry/cad/face_edges.hpp"
 #include "geometry/cad/face_quadrature.hpp"
@@ -12,6 +7,11 @@
 #include "geometry/cad/step_writer.hpp"
 #include "geometry/fit/plates_on_carriers.hpp"
 #include "hal/temporary_folder.hpp"
+
+#include <doctest/doctest.h>
+
+#include <fstream>
+#include <limits>
 
 using namespace moldloft;
 using referee::OcctFace;

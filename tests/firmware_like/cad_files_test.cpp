@@ -1,15 +1,15 @@
 #include "firmware_like/cad_files.hpp"
 
+#include "firmware_like/export_command.hpp"
+#include "firmware_like/run_command.hpp"
+#include "hal/temporary_folder.hpp"
+
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <limits>
 #include <sstream>
-
-#include "firmware_like/export_command.hpp"
-#include "firmware_like/run_command.hpp"
-#include "hal/temporary_folder.hpp"
+#include <unistd.h>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

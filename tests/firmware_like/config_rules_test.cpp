@@ -1,6 +1,9 @@
 // What no key can say alone, and how a file with several errors is told.
 #include "firmware_like/config_rules.hpp"
 
+#include "firmware_like/config.hpp"
+#include "hal/temporary_folder.hpp"
+
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
@@ -8,9 +11,6 @@
 #include <fstream>
 #include <sstream>
 #include <vector>
-
-#include "firmware_like/config.hpp"
-#include "hal/temporary_folder.hpp"
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;
@@ -131,7 +131,7 @@ TEST_CASE("all errors of a file are told, each with its line, in the order of th
           "[robot]\nbaud = 1\nbuad = 2\n[scanner]\nport = 0\nhost = \"a:1\"\n[plate]\nthickness_mm = -1\n") ==
       "cell.toml:2: [robot] baud: 1 is outside 1200 to 921600\n"
       "cell.toml:3: [robot] buad: unknown key; known here: arrival_deg, arrival_mm, baud, device, driver, "
-            "repeatability_z_mm, "
+      "repeatability_z_mm, "
       "speed_percent, workspace\n"
       "cell.toml:5: [scanner] port: 0 is outside 1 to 65535\n"
       "cell.toml:6: [scanner] host: 'a:1' has a port in it; write the address alone, and the port into port\n"

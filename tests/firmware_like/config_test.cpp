@@ -1,5 +1,7 @@
 #include "firmware_like/config.hpp"
 
+#include "hal/temporary_folder.hpp"
+
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
@@ -7,8 +9,6 @@
 #include <fstream>
 #include <sstream>
 #include <vector>
-
-#include "hal/temporary_folder.hpp"
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

@@ -1,15 +1,15 @@
 // Standard error as a person's shell, a service manager or nobody at all sets it up, each in a process of its own.
 #include "firmware_like/console.hpp"
 
+#include "firmware_like/forked.hpp"
+
 #include <doctest/doctest.h>
-#include <fcntl.h>
 #include <fmt/format.h>
+
+#include <fcntl.h>
+#include <string>
 #include <sys/socket.h>
 #include <unistd.h>
-
-#include <string>
-
-#include "firmware_like/forked.hpp"
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

@@ -2,15 +2,15 @@
 // result in it.
 #include "firmware_like/controller.hpp"
 
-#include <doctest/doctest.h>
-
-#include <algorithm>
-#include <utility>
-
 #include "firmware_like/results.hpp"
 #include "firmware_like/run_command.hpp"
 #include "firmware_like/timing_report.hpp"
 #include "hal/cable.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <utility>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

@@ -1,13 +1,13 @@
 // cyclictest's JSON as it was really written, and the program itself replaced by scripts that do what it can do.
 #include "firmware_like/cyclictest.hpp"
 
-#include <doctest/doctest.h>
-#include <stdlib.h>
-
-#include <fstream>
-
 #include "firmware_like/recorded_cyclictest.hpp"
 #include "hal/temporary_folder.hpp"
+
+#include <doctest/doctest.h>
+
+#include <fstream>
+#include <stdlib.h>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

@@ -1,6 +1,7 @@
 #include "firmware_like/display.hpp"
 
 #include <doctest/doctest.h>
+
 #include <fcntl.h>
 #include <stdlib.h>
 #include <sys/ioctl.h>

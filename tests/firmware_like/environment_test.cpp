@@ -1,13 +1,14 @@
 // Machines as recorded trees of /proc and /sys describe them, and the one that the test runs on as its system calls do.
 #include "firmware_like/environment.hpp"
 
+#include "firmware_like/environment_report.hpp"
+#include "firmware_like/recorded_machine.hpp"
+
 #include <doctest/doctest.h>
+
 #include <sys/resource.h>
 #include <sys/utsname.h>
 #include <unistd.h>
-
-#include "firmware_like/environment_report.hpp"
-#include "firmware_like/recorded_machine.hpp"
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

@@ -3,13 +3,13 @@
 #pragma once
 
 #include <doctest/doctest.h>
+
+#include <functional>
 #include <grp.h>
+#include <string>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include <functional>
-#include <string>
 
 namespace moldloft::test {
 

@@ -1,13 +1,13 @@
 #include "firmware_like/journal.hpp"
 
+#include "firmware_like/progress_text.hpp"
+
 #include <doctest/doctest.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <array>
-
-#include "firmware_like/progress_text.hpp"
+#include <sys/stat.h>
+#include <unistd.h>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

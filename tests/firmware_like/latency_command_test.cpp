@@ -1,10 +1,10 @@
 // The parts of `moldloft latency` that need no clock. The command itself runs in tests/host_sim.
 #include "firmware_like/latency_command.hpp"
 
-#include <doctest/doctest.h>
-
 #include "firmware_like/recorded_cyclictest.hpp"
 #include "tasks/scripted_clock.hpp"
+
+#include <doctest/doctest.h>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

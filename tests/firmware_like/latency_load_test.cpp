@@ -1,11 +1,11 @@
 // The load of the timing self-test in virtual time: it must be what it says, or a latency beside it means nothing.
 #include "firmware_like/latency_load.hpp"
 
-#include <doctest/doctest.h>
-
 #include "firmware_like/task_table.hpp"
 #include "hal/run_store.hpp"
 #include "hal/temporary_folder.hpp"
+
+#include <doctest/doctest.h>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

@@ -1,16 +1,16 @@
 // The diagrams against the tables, read row by row, and the page that shows them against the program.
 #include "firmware_like/machines.hpp"
 
+#include "tasks/boundary_tracker.hpp"
+#include "tasks/cell_state.hpp"
+#include "tasks/shot_sequence.hpp"
+
 #include <doctest/doctest.h>
 
 #include <fstream>
 #include <iterator>
 #include <string>
 #include <string_view>
-
-#include "tasks/boundary_tracker.hpp"
-#include "tasks/cell_state.hpp"
-#include "tasks/shot_sequence.hpp"
 
 using namespace moldloft;
 

@@ -1,12 +1,12 @@
 #include "firmware_like/memory_plan.hpp"
 
-#include <doctest/doctest.h>
-#include <malloc.h>
-
-#include <map>
-
 #include "firmware_like/controller.hpp"
 #include "hal/cable.hpp"
+
+#include <doctest/doctest.h>
+
+#include <malloc.h>
+#include <map>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

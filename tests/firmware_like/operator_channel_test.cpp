@@ -1,23 +1,23 @@
 // The operator's words to a controller without devices, which ticks while an answer is waited for.
 #include "firmware_like/operator_channel.hpp"
 
+#include "firmware_like/controller.hpp"
+#include "firmware_like/run_command.hpp"
+#include "hal/cable.hpp"
+#include "hal/temporary_folder.hpp"
+
 #include <doctest/doctest.h>
-#include <sys/socket.h>
-#include <sys/stat.h>
-#include <sys/un.h>
-#include <unistd.h>
+#include <nlohmann/json.hpp>
 
 #include <array>
 #include <filesystem>
 #include <fstream>
 #include <future>
-#include <nlohmann/json.hpp>
 #include <set>
-
-#include "firmware_like/controller.hpp"
-#include "firmware_like/run_command.hpp"
-#include "hal/cable.hpp"
-#include "hal/temporary_folder.hpp"
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

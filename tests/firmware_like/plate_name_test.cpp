@@ -1,13 +1,13 @@
 #include "firmware_like/plate_name.hpp"
 
-#include <doctest/doctest.h>
-
-#include <string>
-
 #include "firmware_like/build_info.hpp"
 #include "firmware_like/results.hpp"
 #include "firmware_like/run_folder.hpp"
 #include "hal/temporary_folder.hpp"
+
+#include <doctest/doctest.h>
+
+#include <string>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

@@ -2,24 +2,24 @@
 // of the device, page faults counted by the kernel. Each case runs in a child process of its own.
 #include "firmware_like/process_setup.hpp"
 
-#include <fcntl.h>
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-#include <pthread.h>
-#include <sched.h>
-
-#include <algorithm>
-#include <cerrno>
-#include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
-#include <sstream>
-#include <thread>
-#include <vector>
-
 #include "firmware_like/control_thread.hpp"
 #include "firmware_like/forked.hpp"
 #include "hal/temporary_folder.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cerrno>
+#include <fcntl.h>
+#include <filesystem>
+#include <fstream>
+#include <pthread.h>
+#include <sched.h>
+#include <sstream>
+#include <thread>
+#include <vector>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

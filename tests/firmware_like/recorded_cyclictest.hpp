@@ -4,7 +4,8 @@
 
 namespace moldloft::firmware_like {
 
-inline constexpr const char* recorded_cyclictest = R"json({"file_version": 1,
+inline constexpr const char* recorded_cyclictest =
+    R"json({"file_version": 1,
 "cmdline:": "cyclictest --quiet --interval=1000 --loops=200 --histogram=400 )json"
     R"json(--histfile=/dev/null --json=small.json --policy=fifo --priority=50 --mlockall",
 "rt_test_version:": "2.40", "start_time": "Wed, 25 Nov 2026 19:51:01 +0000",

@@ -1,12 +1,12 @@
 // Machines as their kernels describe themselves in /proc and /sys, written below a folder of the test's own.
 #pragma once
 
+#include "hal/temporary_folder.hpp"
+
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <string>
-
-#include "hal/temporary_folder.hpp"
 
 namespace moldloft::test {
 

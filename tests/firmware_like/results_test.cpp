@@ -1,14 +1,14 @@
 #include "firmware_like/results.hpp"
 
+#include "firmware_like/run_command.hpp"
+#include "hal/temporary_folder.hpp"
+
 #include <doctest/doctest.h>
-#include <sys/resource.h>
 
 #include <csignal>
 #include <fstream>
 #include <sstream>
-
-#include "firmware_like/run_command.hpp"
-#include "hal/temporary_folder.hpp"
+#include <sys/resource.h>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

@@ -1,14 +1,14 @@
 #include "firmware_like/run_folder.hpp"
 
+#include "firmware_like/forked.hpp"
+#include "hal/temporary_folder.hpp"
+
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <regex>
 #include <set>
-
-#include "firmware_like/forked.hpp"
-#include "hal/temporary_folder.hpp"
+#include <unistd.h>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

@@ -1,16 +1,16 @@
 // The watch on a scripted heartbeat, in virtual time, with a service manager that is a socket of the test's own.
 #include "firmware_like/service_watch.hpp"
 
+#include "hal/temporary_folder.hpp"
+
 #include <doctest/doctest.h>
-#include <sys/socket.h>
-#include <sys/un.h>
-#include <unistd.h>
+#include <nlohmann/json.hpp>
 
 #include <cstdlib>
 #include <fstream>
-#include <nlohmann/json.hpp>
-
-#include "hal/temporary_folder.hpp"
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

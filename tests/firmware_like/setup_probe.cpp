@@ -1,12 +1,12 @@
 // Sets the process up as far as it may, then asks for memory and threads as a program does later on, and says what
 // it got.
+#include "firmware_like/process_setup.hpp"
+
 #include <fmt/format.h>
 
 #include <fstream>
 #include <thread>
 #include <vector>
-
-#include "firmware_like/process_setup.hpp"
 
 using namespace moldloft::firmware_like;
 

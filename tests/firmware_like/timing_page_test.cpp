@@ -1,16 +1,16 @@
 // What people read of a timing report: the table on a terminal and the page.
 #include "firmware_like/timing_page.hpp"
 
-#include <doctest/doctest.h>
-
-#include <regex>
-#include <sstream>
-
 #include "firmware_like/latency_command.hpp"
 #include "firmware_like/log_plot.hpp"
 #include "firmware_like/recorded_cyclictest.hpp"
 #include "firmware_like/timing_table.hpp"
 #include "tasks/scripted_clock.hpp"
+
+#include <doctest/doctest.h>
+
+#include <regex>
+#include <sstream>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

@@ -1,14 +1,14 @@
 // The timing report on scripted time: every cost is known, so is every figure.
 #include "firmware_like/timing_report.hpp"
 
+#include "tasks/scripted_clock.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
 #include <set>
-
-#include "tasks/scripted_clock.hpp"
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

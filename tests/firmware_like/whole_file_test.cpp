@@ -1,15 +1,15 @@
 #include "firmware_like/whole_file.hpp"
 
+#include "hal/temporary_folder.hpp"
+
 #include <doctest/doctest.h>
+
 #include <fcntl.h>
+#include <fstream>
+#include <sstream>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 #include <unistd.h>
-
-#include <fstream>
-#include <sstream>
-
-#include "hal/temporary_folder.hpp"
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;

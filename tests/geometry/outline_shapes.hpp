@@ -1,9 +1,9 @@
 // Outlines as formulas, for tests of what is built on them.
 #pragma once
 
-#include <array>
-
 #include "geometry/edges/outline.hpp"
+
+#include <array>
 
 namespace moldloft::test {
 

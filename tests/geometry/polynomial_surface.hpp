@@ -2,10 +2,11 @@
 // truth is the polynomial.
 #pragma once
 
-#include <Eigen/LU>
-#include <functional>
-
 #include "geometry/splines/bspline.hpp"
+
+#include <Eigen/LU>
+
+#include <functional>
 
 namespace moldloft::test {
 

@@ -1,11 +1,5 @@
 // The control thread's promise: after construction, receive, transmit, trigger, move and record touch the
 // heap not once.
-#include <doctest/doctest.h>
-
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
 #include "hal/cable.hpp"
 #include "hal/line_robot.hpp"
 #include "hal/loopback_server.hpp"
@@ -15,6 +9,12 @@
 #include "hal/scanner_peer.hpp"
 #include "hal/tapped_link.hpp"
 #include "hal/tcp_link.hpp"
+
+#include <doctest/doctest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
 
 namespace {
 

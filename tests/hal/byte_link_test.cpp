@@ -2,18 +2,18 @@
 // pseudo-terminal is asked the same in tests/host_sim, where the preload library is.
 #include "hal/byte_link.hpp"
 
+#include "hal/cable.hpp"
+#include "hal/loopback_server.hpp"
+#include "hal/recorder.hpp"
+#include "hal/tapped_link.hpp"
+#include "hal/tcp_link.hpp"
+
 #include <doctest/doctest.h>
 
 #include <array>
 #include <functional>
 #include <random>
 #include <vector>
-
-#include "hal/cable.hpp"
-#include "hal/loopback_server.hpp"
-#include "hal/recorder.hpp"
-#include "hal/tapped_link.hpp"
-#include "hal/tcp_link.hpp"
 
 using namespace moldloft::hal;
 

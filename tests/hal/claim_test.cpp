@@ -1,14 +1,15 @@
 #include "hal/claim.hpp"
 
+#include "hal/temporary_folder.hpp"
+
 #include <doctest/doctest.h>
+
 #include <fcntl.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include "hal/temporary_folder.hpp"
 
 using namespace moldloft;
 using namespace moldloft::hal;

@@ -1,10 +1,10 @@
 #include "hal/clock.hpp"
 
 #include <doctest/doctest.h>
-#include <sys/time.h>
 
 #include <csignal>
 #include <ctime>
+#include <sys/time.h>
 
 using namespace moldloft::hal;
 using namespace std::chrono_literals;

@@ -1,12 +1,12 @@
 // A driver on a cable with its peer at the other end, in ticks of 1 ms of virtual time, and all that it has reported.
 #pragma once
 
+#include "hal/cable.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <vector>
-
-#include "hal/cable.hpp"
 
 namespace moldloft::hal {
 

@@ -1,16 +1,16 @@
 // The flight recorder: what its ring keeps, when it freezes, and that its file says the same.
 #include "hal/flight_recorder.hpp"
 
+#include "hal/temporary_folder.hpp"
+
 #include <doctest/doctest.h>
-#include <fcntl.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <csignal>
+#include <fcntl.h>
 #include <filesystem>
 #include <fstream>
-
-#include "hal/temporary_folder.hpp"
+#include <sys/wait.h>
+#include <unistd.h>
 
 using namespace moldloft::hal;
 using namespace std::chrono_literals;

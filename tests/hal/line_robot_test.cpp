@@ -1,11 +1,11 @@
 #include "hal/line_robot.hpp"
 
+#include "hal/driver_bench.hpp"
+#include "hal/robot_peer.hpp"
+
 #include <doctest/doctest.h>
 
 #include <random>
-
-#include "hal/driver_bench.hpp"
-#include "hal/robot_peer.hpp"
 
 using namespace moldloft::hal;
 using Kind = RobotEvent::Kind;

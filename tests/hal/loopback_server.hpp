@@ -3,14 +3,13 @@
 #pragma once
 
 #include <arpa/inet.h>
-#include <fcntl.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <cstddef>
 #include <cstdint>
+#include <fcntl.h>
+#include <netinet/in.h>
 #include <span>
+#include <sys/socket.h>
+#include <unistd.h>
 #include <utility>
 
 namespace moldloft::hal {

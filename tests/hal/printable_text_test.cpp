@@ -1,10 +1,10 @@
 #include "hal/printable_text.hpp"
 
+#include "hal/psc1.hpp"
+
 #include <doctest/doctest.h>
 
 #include <random>
-
-#include "hal/psc1.hpp"
 
 using namespace moldloft::hal;
 using namespace std::string_literals;

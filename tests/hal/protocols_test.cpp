@@ -1,4 +1,7 @@
 // PROTOCOLS.md against the code: every vector on that page decodes, and encodes again to the same bytes.
+#include "hal/psc1.hpp"
+#include "hal/robot_line.hpp"
+
 #include <doctest/doctest.h>
 
 #include <charconv>
@@ -10,9 +13,6 @@
 #include <sstream>
 #include <string>
 #include <vector>
-
-#include "hal/psc1.hpp"
-#include "hal/robot_line.hpp"
 
 using namespace moldloft::hal;
 using namespace moldloft::hal::psc1;

@@ -1,5 +1,8 @@
 #include "hal/psc1.hpp"
 
+#include "hal/crc32c.hpp"
+#include "hal/sample_frame.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
@@ -7,9 +10,6 @@
 #include <random>
 #include <string>
 #include <vector>
-
-#include "hal/crc32c.hpp"
-#include "hal/sample_frame.hpp"
 
 using namespace moldloft::hal;
 using namespace moldloft::hal::psc1;

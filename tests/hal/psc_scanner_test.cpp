@@ -1,13 +1,13 @@
 #include "hal/psc_scanner.hpp"
 
+#include "hal/driver_bench.hpp"
+#include "hal/scanner_peer.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cstring>
 #include <random>
-
-#include "hal/driver_bench.hpp"
-#include "hal/scanner_peer.hpp"
 
 using namespace moldloft::hal;
 using Kind = ScannerEvent::Kind;

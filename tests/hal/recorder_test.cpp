@@ -1,18 +1,18 @@
 #include "hal/recorder.hpp"
 
-#include <doctest/doctest.h>
-#include <sqlite3.h>
-
-#include <algorithm>
-#include <atomic>
-#include <thread>
-
 #include "hal/cable.hpp"
 #include "hal/psc_scanner.hpp"
 #include "hal/run_store.hpp"
 #include "hal/scanner_peer.hpp"
 #include "hal/tapped_link.hpp"
 #include "hal/temporary_folder.hpp"
+
+#include <doctest/doctest.h>
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <atomic>
+#include <thread>
 
 using namespace moldloft::hal;
 

@@ -1,9 +1,9 @@
 // A robot program that somebody has written from PROTOCOLS.md and got one thing wrong: what the driver says names it.
-#include <doctest/doctest.h>
-
 #include "hal/driver_bench.hpp"
 #include "hal/line_robot.hpp"
 #include "hal/robot_peer.hpp"
+
+#include <doctest/doctest.h>
 
 using namespace moldloft::hal;
 using namespace std::string_literals;

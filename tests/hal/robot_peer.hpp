@@ -2,14 +2,14 @@
 // be read at a glance, with hooks to damage what it says. It counts what really moves.
 #pragma once
 
+#include "hal/byte_link.hpp"
+#include "hal/clock.hpp"
+#include "hal/robot_line.hpp"
+
 #include <algorithm>
 #include <functional>
 #include <string>
 #include <vector>
-
-#include "hal/byte_link.hpp"
-#include "hal/clock.hpp"
-#include "hal/robot_line.hpp"
 
 namespace moldloft::hal {
 

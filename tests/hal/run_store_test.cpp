@@ -1,16 +1,16 @@
 #include "hal/run_store.hpp"
 
+#include "hal/psc1.hpp"
+#include "hal/sample_frame.hpp"
+#include "hal/temporary_folder.hpp"
+
 #include <doctest/doctest.h>
 #include <sqlite3.h>
-#include <sys/resource.h>
 
 #include <csignal>
 #include <cstring>
 #include <fstream>
-
-#include "hal/psc1.hpp"
-#include "hal/sample_frame.hpp"
-#include "hal/temporary_folder.hpp"
+#include <sys/resource.h>
 
 using namespace moldloft::hal;
 using Mode = RunStore::Mode;

@@ -1,9 +1,9 @@
 // A frame whose numbers are known: what the suites of codec, driver and store send around.
 #pragma once
 
-#include <cmath>
-
 #include "hal/frame.hpp"
+
+#include <cmath>
 
 namespace moldloft::hal {
 

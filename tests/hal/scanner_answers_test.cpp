@@ -1,14 +1,14 @@
 // A scanner that somebody has written from PROTOCOLS.md and that is there, but not as it should be: what the driver
 // says names it.
+#include "hal/driver_bench.hpp"
+#include "hal/psc_scanner.hpp"
+#include "hal/scanner_peer.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <string>
-
-#include "hal/driver_bench.hpp"
-#include "hal/psc_scanner.hpp"
-#include "hal/scanner_peer.hpp"
 
 using namespace moldloft::hal;
 using Kind = ScannerEvent::Kind;

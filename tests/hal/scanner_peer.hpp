@@ -2,14 +2,14 @@
 // damage what it sends. It counts what is really exposed.
 #pragma once
 
-#include <deque>
-#include <functional>
-#include <vector>
-
 #include "hal/byte_link.hpp"
 #include "hal/clock.hpp"
 #include "hal/psc1.hpp"
 #include "hal/sample_frame.hpp"
+
+#include <deque>
+#include <functional>
+#include <vector>
 
 namespace moldloft::hal {
 

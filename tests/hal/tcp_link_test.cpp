@@ -1,13 +1,13 @@
 #include "hal/tcp_link.hpp"
 
-#include <doctest/doctest.h>
-#include <netinet/tcp.h>
-
-#include <functional>
-#include <string>
-
 #include "hal/clock.hpp"
 #include "hal/loopback_server.hpp"
+
+#include <doctest/doctest.h>
+
+#include <functional>
+#include <netinet/tcp.h>
+#include <string>
 
 using namespace moldloft::hal;
 

@@ -1,10 +1,9 @@
 // A folder of one test's own, gone at its end.
 #pragma once
 
-#include <unistd.h>
-
 #include <filesystem>
 #include <string>
+#include <unistd.h>
 
 namespace moldloft::hal {
 

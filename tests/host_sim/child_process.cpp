@@ -1,13 +1,12 @@
 #include "host_sim/child_process.hpp"
 
+#include <algorithm>
 #include <fcntl.h>
+#include <fstream>
 #include <signal.h>
+#include <sstream>
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include <algorithm>
-#include <fstream>
-#include <sstream>
 
 namespace moldloft::host_sim {
 

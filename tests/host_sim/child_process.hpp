@@ -2,14 +2,14 @@
 // and it never outlives the test.
 #pragma once
 
+#include "hal/clock.hpp"
+#include "hal/temporary_folder.hpp"
+
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
-
-#include "hal/clock.hpp"
-#include "hal/temporary_folder.hpp"
 
 namespace moldloft::host_sim {
 

@@ -1,9 +1,8 @@
 #include "host_sim/heap_guard.hpp"
 
+#include <cstdlib>
 #include <execinfo.h>
 #include <unistd.h>
-
-#include <cstdlib>
 
 namespace {
 

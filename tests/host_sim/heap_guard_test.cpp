@@ -3,19 +3,19 @@
 // count, nor does the drain of the recorder, which is another thread's on a real cell.
 #include "host_sim/heap_guard.hpp"
 
-#include <doctest/doctest.h>
-
-#include <cstdlib>
-#include <functional>
-#include <memory>
-#include <vector>
-
 #include "firmware_like/controller.hpp"
 #include "firmware_like/run_folder.hpp"
 #include "hal/cable.hpp"
 #include "hal/temporary_folder.hpp"
 #include "host_sim/cell_config.hpp"
 #include "host_sim/world.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <vector>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

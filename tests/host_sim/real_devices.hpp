@@ -2,15 +2,15 @@
 // deployed program on them.
 #pragma once
 
+#include "hal/temporary_folder.hpp"
+#include "host_sim/child_process.hpp"
+
 #include <doctest/doctest.h>
 
 #include <fstream>
 #include <sstream>
 #include <string>
 #include <vector>
-
-#include "hal/temporary_folder.hpp"
-#include "host_sim/child_process.hpp"
 
 namespace moldloft::host_sim {
 

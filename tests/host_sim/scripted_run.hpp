@@ -3,17 +3,17 @@
 // shot and no record is lost.
 #pragma once
 
+#include "hal/temporary_folder.hpp"
+#include "host_sim/cell_config.hpp"
+#include "host_sim/child_process.hpp"
+#include "host_sim/simulated_run.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <functional>
 #include <set>
 #include <sstream>
-
-#include "hal/temporary_folder.hpp"
-#include "host_sim/cell_config.hpp"
-#include "host_sim/child_process.hpp"
-#include "host_sim/simulated_run.hpp"
 
 namespace moldloft::host_sim {
 

@@ -4,12 +4,12 @@
 //
 // With a second argument it says one byte and listens until the far end is gone: exit code 0 when a
 // silent line was open and the line without a far end is lost.
-#include <cstdio>
-#include <string>
-
 #include "hal/clock.hpp"
 #include "hal/robot_line.hpp"
 #include "hal/serial_link.hpp"
+
+#include <cstdio>
+#include <string>
 
 using namespace moldloft::hal;
 using namespace std::chrono_literals;

@@ -1,12 +1,12 @@
-#include <doctest/doctest.h>
-
-#include <cmath>
-#include <numbers>
-
 #include "host_sim/arm_drive.hpp"
 #include "host_sim/gantry_arm.hpp"
 #include "host_sim/scara_arm.hpp"
 #include "tasks/tool_pose.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <numbers>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

@@ -1,17 +1,17 @@
 // Bad input to the real programs, as a user meets it: one line on standard error that names what, where and
 // what to do, an exit code that is not 0, nothing on standard output, and nothing left behind that would
 // block the next try.
+#include "firmware_like/run_command.hpp"
+#include "firmware_like/task_table.hpp"
+#include "host_sim/child_process.hpp"
+
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
-
-#include "firmware_like/run_command.hpp"
-#include "firmware_like/task_table.hpp"
-#include "host_sim/child_process.hpp"
+#include <unistd.h>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;
@@ -208,7 +208,8 @@ TEST_CASE("an option that the plate cannot follow is refused instead of passed o
     CHECK(refused.out == "");
   };
   refuses({"--unit", "m"}, "--unit: is for mesh files; the plate 'saddle' is a formula in mm; ");
-  refuses({"--plate", "dome", "--unit", "mm"}, "--unit: is for mesh files; the plate 'dome' is a formula in mm; ");
+  refuses({"--plate", "dome", "--unit", "mm"},
+          "--unit: is for mesh files; the plate 'dome' is a formula in mm; ");
   refuses({"--plate", "a.ply", "--unit", "furlong"},
           "--unit: no unit is called 'furlong': choose mm, cm, m or inch; ");
   refuses({"--plate", "a.stl", "--width", "300"},

@@ -1,12 +1,12 @@
-#include <doctest/doctest.h>
-
-#include <numbers>
-#include <string>
-
 #include "hal/cable.hpp"
 #include "host_sim/plan_polygon.hpp"
 #include "host_sim/world.hpp"
 #include "tasks/tool_pose.hpp"
+
+#include <doctest/doctest.h>
+
+#include <numbers>
+#include <string>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

@@ -1,10 +1,4 @@
 // `moldloft check`: all that is wrong at once, and the devices asked without a motion.
-#include <doctest/doctest.h>
-
-#include <csignal>
-#include <filesystem>
-#include <fstream>
-
 #include "firmware_like/device_check.hpp"
 #include "firmware_like/run_command.hpp"
 #include "hal/cable.hpp"
@@ -12,6 +6,12 @@
 #include "host_sim/child_process.hpp"
 #include "host_sim/world.hpp"
 #include "host_sim/world_clock.hpp"
+
+#include <doctest/doctest.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

@@ -1,12 +1,12 @@
 // What is wrong with arguments is one line that says what to do; and the plate's name goes into everything.
-#include <doctest/doctest.h>
-
-#include <filesystem>
-
 #include "firmware_like/build_info.hpp"
 #include "firmware_like/run_command.hpp"
 #include "hal/run_store.hpp"
 #include "host_sim/child_process.hpp"
+
+#include <doctest/doctest.h>
+
+#include <filesystem>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

@@ -1,12 +1,12 @@
-#include <doctest/doctest.h>
-
-#include <cmath>
-#include <numbers>
-
 #include "hal/cable.hpp"
 #include "hal/line_robot.hpp"
 #include "hal/psc_scanner.hpp"
 #include "host_sim/world.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <numbers>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

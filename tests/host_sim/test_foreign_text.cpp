@@ -1,10 +1,5 @@
 // Text that others bring (a device's ERROR, a file's name, a configuration, an operator's word), through a whole
 // run and every command that reads it afterwards: no run ends by it, and every file is what its ending says.
-#include <doctest/doctest.h>
-#include <fmt/format.h>
-
-#include <sstream>
-
 #include "firmware_like/export_command.hpp"
 #include "firmware_like/operator_channel.hpp"
 #include "firmware_like/replay_command.hpp"
@@ -12,6 +7,11 @@
 #include "firmware_like/run_command.hpp"
 #include "hal/psc1.hpp"
 #include "host_sim/scripted_run.hpp"
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <sstream>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

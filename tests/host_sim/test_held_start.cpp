@@ -1,8 +1,8 @@
 // A program that the service manager has started again: nothing reaches the robot before an operator says so.
-#include <doctest/doctest.h>
-
 #include "firmware_like/run_command.hpp"
 #include "host_sim/scripted_run.hpp"
+
+#include <doctest/doctest.h>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

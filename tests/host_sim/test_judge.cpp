@@ -1,12 +1,12 @@
+#include "hal/temporary_folder.hpp"
+#include "host_sim/judge.hpp"
+
 #include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
 
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
-
-#include "hal/temporary_folder.hpp"
-#include "host_sim/judge.hpp"
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

@@ -1,15 +1,15 @@
 // Meshes as plates: laid flat, repaired, and refused with a true word where they are no single sheet.
+#include "host_sim/mesh_plate.hpp"
+#include "host_sim/mesh_weld.hpp"
+#include "host_sim/outline_grid.hpp"
+#include "host_sim/plan_polygon.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <filesystem>
 #include <numbers>
 #include <random>
-
-#include "host_sim/mesh_plate.hpp"
-#include "host_sim/mesh_weld.hpp"
-#include "host_sim/outline_grid.hpp"
-#include "host_sim/plan_polygon.hpp"
 
 using namespace moldloft::host_sim;
 

@@ -1,11 +1,11 @@
 // A link as fast as its wire, on a clock that the test moves and a link within that takes and gives at once.
+#include "host_sim/paced_link.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <array>
 #include <vector>
-
-#include "host_sim/paced_link.hpp"
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

@@ -1,9 +1,9 @@
+#include "host_sim/plan_polygon.hpp"
+#include "host_sim/plate_shape.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
-
-#include "host_sim/plan_polygon.hpp"
-#include "host_sim/plate_shape.hpp"
 
 using namespace moldloft::host_sim;
 

@@ -1,12 +1,12 @@
+#include "hal/temporary_folder.hpp"
+#include "host_sim/mesh_file.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
-
-#include "hal/temporary_folder.hpp"
-#include "host_sim/mesh_file.hpp"
 
 using namespace moldloft::host_sim;
 

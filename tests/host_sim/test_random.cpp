@@ -1,9 +1,9 @@
+#include "host_sim/random.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <numbers>
-
-#include "host_sim/random.hpp"
 
 using namespace moldloft::host_sim;
 

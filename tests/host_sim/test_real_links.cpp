@@ -1,18 +1,18 @@
 // The programs as they are deployed, in real time: the controller on a TCP socket and a serial port, the
 // simulated devices behind them. Nothing here depends on how fast the machine answers; all waits have a
 // limit.
-#include <doctest/doctest.h>
-
-#include <csignal>
-#include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
-
 #include "firmware_like/flight_files.hpp"
 #include "firmware_like/run_command.hpp"
 #include "hal/run_store.hpp"
 #include "host_sim/child_process.hpp"
 #include "host_sim/real_devices.hpp"
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

@@ -1,11 +1,11 @@
 // The simulated robot on a serial port: the device server opens it as any program would. The port is a
 // pseudo-terminal whose other end this test holds, so the modem-control requests are answered by the preloaded library.
+#include "host_sim/child_process.hpp"
+#include "host_sim/pty_link.hpp"
+
 #include <doctest/doctest.h>
 
 #include <array>
-
-#include "host_sim/child_process.hpp"
-#include "host_sim/pty_link.hpp"
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

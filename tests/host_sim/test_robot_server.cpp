@@ -1,14 +1,14 @@
+#include "hal/cable.hpp"
+#include "host_sim/late_client.hpp"
+#include "host_sim/robot_server.hpp"
+#include "host_sim/scara_arm.hpp"
+
 #include <doctest/doctest.h>
 
 #include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
-
-#include "hal/cable.hpp"
-#include "host_sim/late_client.hpp"
-#include "host_sim/robot_server.hpp"
-#include "host_sim/scara_arm.hpp"
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

@@ -1,13 +1,13 @@
+#include "hal/cable.hpp"
+#include "host_sim/late_client.hpp"
+#include "host_sim/plate_shape.hpp"
+#include "host_sim/scanner_server.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cstring>
 #include <optional>
 #include <vector>
-
-#include "hal/cable.hpp"
-#include "host_sim/late_client.hpp"
-#include "host_sim/plate_shape.hpp"
-#include "host_sim/scanner_server.hpp"
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

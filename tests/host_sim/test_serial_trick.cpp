@@ -1,20 +1,20 @@
-#include <doctest/doctest.h>
-#include <fcntl.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <array>
-#include <atomic>
-#include <filesystem>
-#include <string>
-#include <thread>
-
 #include "hal/clock.hpp"
 #include "hal/psc1.hpp"
 #include "hal/tcp_link.hpp"
 #include "host_sim/cell_description.hpp"
 #include "host_sim/pty_link.hpp"
 #include "host_sim/tcp_server_link.hpp"
+
+#include <doctest/doctest.h>
+
+#include <array>
+#include <atomic>
+#include <fcntl.h>
+#include <filesystem>
+#include <string>
+#include <sys/wait.h>
+#include <thread>
+#include <unistd.h>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

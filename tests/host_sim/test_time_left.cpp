@@ -1,12 +1,12 @@
 // What a run says of the time that it still takes, held against the time that it then took.
+#include "firmware_like/run_command.hpp"
+#include "host_sim/scripted_run.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
-
-#include "firmware_like/run_command.hpp"
-#include "host_sim/scripted_run.hpp"
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

@@ -1,13 +1,13 @@
 // What the deployed program says on standard error: to a terminal's user, to a file, to the system's journal.
-#include <doctest/doctest.h>
-#include <unistd.h>
-
-#include <csignal>
-#include <nlohmann/json.hpp>
-#include <sstream>
-
 #include "firmware_like/run_command.hpp"
 #include "host_sim/real_devices.hpp"
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
+
+#include <csignal>
+#include <sstream>
+#include <unistd.h>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

@@ -1,11 +1,11 @@
 // The whole cell under virtual time: controller, cables, devices, plate; nothing goes wrong here.
-#include <doctest/doctest.h>
-
 #include "firmware_like/build_info.hpp"
 #include "firmware_like/export_command.hpp"
 #include "firmware_like/run_command.hpp"
 #include "host_sim/day.hpp"
 #include "host_sim/scripted_run.hpp"
+
+#include <doctest/doctest.h>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

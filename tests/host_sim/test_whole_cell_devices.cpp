@@ -1,13 +1,13 @@
 // Devices that are there and do not do what the cell expects: what it says, and what it does not do.
+#include "firmware_like/run_command.hpp"
+#include "hal/robot_line.hpp"
+#include "host_sim/scripted_run.hpp"
+
 #include <doctest/doctest.h>
 
 #include <fstream>
 #include <map>
 #include <set>
-
-#include "firmware_like/run_command.hpp"
-#include "hal/robot_line.hpp"
-#include "host_sim/scripted_run.hpp"
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

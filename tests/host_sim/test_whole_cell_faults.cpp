@@ -1,12 +1,12 @@
 // What goes wrong, as DESIGN section 4 lists it, one case each: the cell under virtual time with a script
 // that breaks something. The invariants are ScriptedRun's.
-#include <doctest/doctest.h>
-#include <sys/resource.h>
-
-#include <csignal>
-
 #include "firmware_like/run_command.hpp"
 #include "host_sim/scripted_run.hpp"
+
+#include <doctest/doctest.h>
+
+#include <csignal>
+#include <sys/resource.h>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

@@ -1,12 +1,12 @@
 // What the installed library promises to somebody who has read its headers only: a plane that was measured on a
 // square plate comes back as that plane.
-#include <cmath>
-#include <cstdio>
-#include <vector>
-
 #include "geometry/edges/outline.hpp"
 #include "geometry/fit/plan_map.hpp"
 #include "geometry/fit/surface_fit.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <vector>
 
 using namespace moldloft::geometry;
 

@@ -1,10 +1,10 @@
 #include "package/own_robot.hpp"
 
+#include "hal/driver_bench.hpp"
+
 #include <doctest/doctest.h>
 
 #include <string>
-
-#include "hal/driver_bench.hpp"
 
 using namespace std::chrono_literals;
 using moldloft::hal::ByteLink;

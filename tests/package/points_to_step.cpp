@@ -1,14 +1,14 @@
 // Points to STEP: from a file of x y z lines (mm) to the surface through them, as CAD programs read it.
 //
 //     points_to_step IN.xyz OUT.step
+#include "geometry/cad/step_writer.hpp"
+#include "geometry/fit/fit_surface.hpp"
+
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <string>
 #include <vector>
-
-#include "geometry/cad/step_writer.hpp"
-#include "geometry/fit/fit_surface.hpp"
 
 using namespace moldloft::geometry;
 

@@ -1,9 +1,8 @@
 // The preloaded guard itself: it sees everything that a real-time section may not do, and nothing else.
-#include <doctest/doctest.h>
-
-#include <nlohmann/json.hpp>
-
 #include "realtime/guarded_run.hpp"
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
 
 using namespace moldloft;
 using test::report_of_probe;

@@ -1,13 +1,13 @@
 // Programs under the preloaded guard, and what it reports of them.
 #pragma once
 
-#include <doctest/doctest.h>
-
-#include <nlohmann/json.hpp>
-#include <string>
-
 #include "hal/temporary_folder.hpp"
 #include "host_sim/child_process.hpp"
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
+
+#include <string>
 
 namespace moldloft::test {
 

@@ -1,12 +1,12 @@
 // The deployed program under the preloaded guard, over a complete run on a TCP socket and a serial port: the control
 // thread neither allocates, nor locks, nor waits, drivers and fit included.
-#include <doctest/doctest.h>
-
-#include <sys/mman.h>
-
 #include "firmware_like/run_command.hpp"
 #include "host_sim/real_devices.hpp"
 #include "realtime/guarded_run.hpp"
+
+#include <doctest/doctest.h>
+
+#include <sys/mman.h>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;

@@ -7,20 +7,6 @@
 // The report says how often each guarded function was called there, and as a sign that the guard was awake also how
 // often the section slept to its tick and asked a descriptor that does not wait. The first call that counts leaves its
 // stack on standard error. MOLDLOFT_GUARD_BREAK=NAME breaks the rule once, in the middle of the section.
-#include <dlfcn.h>
-#include <execinfo.h>
-#include <fcntl.h>
-#include <netdb.h>
-#include <poll.h>
-#include <pthread.h>
-#include <semaphore.h>
-#include <sys/epoll.h>
-#include <sys/mman.h>
-#include <sys/select.h>
-#include <sys/socket.h>
-#include <sys/uio.h>
-#include <unistd.h>
-
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -29,7 +15,20 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <dlfcn.h>
+#include <execinfo.h>
+#include <fcntl.h>
+#include <netdb.h>
+#include <poll.h>
+#include <pthread.h>
+#include <semaphore.h>
 #include <string_view>
+#include <sys/epoll.h>
+#include <sys/mman.h>
+#include <sys/select.h>
+#include <sys/socket.h>
+#include <sys/uio.h>
+#include <unistd.h>
 #include <utility>
 
 // The program's own mark stands before this one, which is there for programs that have none.

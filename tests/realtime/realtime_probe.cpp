@@ -1,6 +1,15 @@
 // Breaks the promise of a real-time section on purpose, in the way that its argument names, so that tests can see each
 // guard fail. `all` does everything that the preloaded guard knows, each thing at least once; `allowed` what the
 // control thread may do; `outside` everything, but beside the section.
+#include "hal/clock.hpp"
+#include "hal/realtime.hpp"
+#include "hal/realtime_section.hpp"
+
+#include <array>
+#include <atomic>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <malloc.h>
@@ -8,6 +17,7 @@
 #include <poll.h>
 #include <pthread.h>
 #include <semaphore.h>
+#include <string_view>
 #include <sys/epoll.h>
 #include <sys/mman.h>
 #include <sys/select.h>
@@ -15,18 +25,7 @@
 #include <sys/syscall.h>
 #include <sys/uio.h>
 #include <unistd.h>
-
-#include <array>
-#include <atomic>
-#include <cstdio>
-#include <cstdlib>
-#include <ctime>
-#include <string_view>
 #include <vector>
-
-#include "hal/clock.hpp"
-#include "hal/realtime.hpp"
-#include "hal/realtime_section.hpp"
 
 // What a hardened program calls instead, when the compiler knows how large the buffer is.
 extern "C" {

@@ -1,11 +1,11 @@
 #include "tasks/boundary_tracker.hpp"
 
+#include "tasks/flat_world.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <string>
-
-#include "tasks/flat_world.hpp"
 
 using namespace moldloft;
 using namespace moldloft::tasks;

@@ -1,13 +1,13 @@
 // A flat plate on a table, seen without noise by a level scanner: enough world to drive the tracker.
 #pragma once
 
-#include <array>
-#include <cmath>
-#include <limits>
-
 #include "hal/frame.hpp"
 #include "tasks/boundary_tracker.hpp"
 #include "tasks/shot_view.hpp"
+
+#include <array>
+#include <cmath>
+#include <limits>
 
 namespace moldloft::tasks {
 

@@ -1,13 +1,13 @@
 // The tables are complete: every pair of state and event is listed or explicitly ignored, never both, and
 // every state can be reached.
+#include "tasks/boundary_tracker.hpp"
+#include "tasks/cell_state.hpp"
+#include "tasks/shot_sequence.hpp"
+
 #include <doctest/doctest.h>
 
 #include <set>
 #include <utility>
-
-#include "tasks/boundary_tracker.hpp"
-#include "tasks/cell_state.hpp"
-#include "tasks/shot_sequence.hpp"
 
 using namespace moldloft::tasks;
 

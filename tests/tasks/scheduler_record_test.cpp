@@ -1,12 +1,12 @@
 // What the scheduler counts and whom it blames, to the nanosecond on a scripted clock.
+#include "tasks/scheduler.hpp"
+#include "tasks/scripted_clock.hpp"
+
 #include <doctest/doctest.h>
 
 #include <array>
 #include <cstdlib>
 #include <functional>
-
-#include "tasks/scheduler.hpp"
-#include "tasks/scripted_clock.hpp"
 
 using namespace moldloft::tasks;
 using Instants = std::vector<Instant>;

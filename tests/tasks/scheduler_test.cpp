@@ -1,8 +1,8 @@
 #include "tasks/scheduler.hpp"
 
-#include <doctest/doctest.h>
-
 #include "tasks/scripted_clock.hpp"
+
+#include <doctest/doctest.h>
 
 using namespace moldloft::tasks;
 using Instants = std::vector<Instant>;

@@ -1,9 +1,9 @@
 // A clock that moves only when a task says what it costs, and tasks that follow a script of costs.
 #pragma once
 
-#include <vector>
-
 #include "tasks/scheduler.hpp"
+
+#include <vector>
 
 namespace moldloft::tasks {
 

@@ -1,11 +1,11 @@
 #include "tasks/shot_view.hpp"
 
+#include "tasks/flat_world.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cstring>
-
-#include "tasks/flat_world.hpp"
 
 using namespace moldloft;
 using namespace moldloft::tasks;

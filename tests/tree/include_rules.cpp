@@ -1,7 +1,7 @@
-#include <algorithm>
-
 #include "tree/rules.hpp"
 #include "tree/source_text.hpp"
+
+#include <algorithm>
 
 namespace moldloft::tree {
 namespace {

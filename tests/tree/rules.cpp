@@ -1,10 +1,10 @@
 #include "tree/rules.hpp"
 
+#include "tree/source_text.hpp"
+
 #include <algorithm>
 #include <regex>
 #include <set>
-
-#include "tree/source_text.hpp"
 
 namespace moldloft::tree {
 namespace {

@@ -1,8 +1,9 @@
 // Each rule is seen failing on text that breaks it, and silent on the nearest text that does not.
-#include <doctest/doctest.h>
-
 #include "tree/rules.hpp"
+
 #include "tree/source_text.hpp"
+
+#include <doctest/doctest.h>
 
 using namespace moldloft::tree;
 

@@ -1,13 +1,13 @@
 // The tree as it lies on the disk keeps its rules.
+#include "tree/rules.hpp"
+#include "tree/source_text.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-
-#include "tree/rules.hpp"
-#include "tree/source_text.hpp"
 
 using namespace moldloft::tree;
 namespace fs = std::filesystem;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Sparse>
 #include <Eigen/SparseCholesky>
+
 #include <algorithm>
 #include <cstring>
 #include <vector>

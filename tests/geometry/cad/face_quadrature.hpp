@@ -3,11 +3,11 @@
 // the tenth power.
 #pragma once
 
+#include "geometry/splines/trimmed_surface.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-
-#include "geometry/splines/trimmed_surface.hpp"
 
 namespace moldloft::test {
 

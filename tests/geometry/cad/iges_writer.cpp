@@ -1,12 +1,12 @@
 #include "geometry/cad/iges_writer.hpp"
 
+#include "geometry/cad/iges_file.hpp"
+#include "geometry/cad/sample_faces.hpp"
+
 #include <doctest/doctest.h>
 
 #include <limits>
 #include <set>
-
-#include "geometry/cad/iges_file.hpp"
-#include "geometry/cad/sample_faces.hpp"
 
 using namespace moldloft;
 using geometry::CadLabel, geometry::Error, geometry::TrimmedSurface, geometry::iges_text;

@@ -1,13 +1,13 @@
 // Faces to write, trimmed and not, whose shapes follow from formulas.
 #pragma once
 
-#include <cmath>
-#include <functional>
-#include <numbers>
-
 #include "geometry/fit/plan_map.hpp"
 #include "geometry/outline_shapes.hpp"
 #include "geometry/splines/trimmed_surface.hpp"
+
+#include <cmath>
+#include <functional>
+#include <numbers>
 
 namespace moldloft::test {
 

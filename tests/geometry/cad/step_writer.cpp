@@ -1,13 +1,13 @@
 #include "geometry/cad/step_writer.hpp"
 
+#include "geometry/cad/sample_faces.hpp"
+#include "geometry/cad/step_file.hpp"
+
 #include <doctest/doctest.h>
 
 #include <limits>
 #include <set>
 #include <sstream>
-
-#include "geometry/cad/sample_faces.hpp"
-#include "geometry/cad/step_file.hpp"
 
 using namespace moldloft;
 using geometry::CadLabel, geometry::Error, geometry::TrimmedSurface, geometry::step_text;

@@ -1,18 +1,18 @@
 // Everything in edges/ that takes data from outside, given data that make no sense: each is refused by its
 // own name, or left out where one bad number among thousands good ones is what a scanner gives. Nothing
 // crashes and nothing invents a plate.
-#include <doctest/doctest.h>
-
-#include <cmath>
-#include <limits>
-#include <random>
-
 #include "geometry/edges/boundary_view.hpp"
 #include "geometry/edges/corner_choice.hpp"
 #include "geometry/edges/edge_lines.hpp"
 #include "geometry/edges/outline.hpp"
 #include "geometry/edges/plate_runs.hpp"
 #include "geometry/edges/stripe_scene.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
 
 using namespace moldloft;
 using namespace moldloft::geometry;

@@ -1,13 +1,13 @@
 #include "geometry/edges/boundary_view.hpp"
 
+#include "geometry/edges/stripe_scene.hpp"
+#include "geometry/heap_watch.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <numbers>
 #include <random>
-
-#include "geometry/heap_watch.hpp"
-#include "geometry/edges/stripe_scene.hpp"
 
 using namespace moldloft;
 using geometry::BoundaryPiece, geometry::BoundaryViewer, geometry::PlateRunFinder;

@@ -1,12 +1,12 @@
 #include "geometry/edges/outline.hpp"
 
+#include "geometry/heap_watch.hpp"
+
 #include <doctest/doctest.h>
 
 #include <chrono>
 #include <cmath>
 #include <random>
-
-#include "geometry/heap_watch.hpp"
 
 using namespace moldloft;
 using Eigen::Vector2d;

@@ -1,13 +1,13 @@
 #include "geometry/edges/plate_runs.hpp"
 
+#include "geometry/edges/stripe_scene.hpp"
+#include "geometry/heap_watch.hpp"
+
 #include <doctest/doctest.h>
 
 #include <chrono>
 #include <cmath>
 #include <string>
-
-#include "geometry/edges/stripe_scene.hpp"
-#include "geometry/heap_watch.hpp"
 
 using namespace moldloft;
 using geometry::Error, geometry::PlateRun, geometry::PlateRunFinder, geometry::PlateRunSettings,

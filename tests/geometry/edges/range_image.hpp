@@ -2,15 +2,16 @@
 // tree. Every row is one laser profile: rows are stripes, columns are points.
 #pragma once
 
+#include "geometry/edges/plate_runs.hpp"
+
+#include <nlohmann/json.hpp>
+
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
-
-#include "geometry/edges/plate_runs.hpp"
 
 namespace moldloft::test {
 

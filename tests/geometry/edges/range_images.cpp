@@ -2,15 +2,15 @@
 // one laser profile, so rows are stripes and columns are points. The expected positions were read by eye from
 // enlarged pictures of the height maps, before anything was computed; the tolerances say how well they can be
 // read.
+#include "geometry/edges/boundary_view.hpp"
+#include "geometry/edges/plate_runs.hpp"
+#include "geometry/edges/range_image.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <string>
 #include <vector>
-
-#include "geometry/edges/boundary_view.hpp"
-#include "geometry/edges/plate_runs.hpp"
-#include "geometry/edges/range_image.hpp"
 
 using namespace moldloft::geometry;
 using moldloft::test::RangeImage, moldloft::test::Stripes, moldloft::test::stripes_of;

@@ -2,13 +2,14 @@
 // way a stripe scanner samples, with everything that hurts switched on one by one. The truth is the formula.
 #pragma once
 
+#include "geometry/edges/plate_runs.hpp"
+
 #include <Eigen/Core>
+
 #include <functional>
 #include <limits>
 #include <random>
 #include <vector>
-
-#include "geometry/edges/plate_runs.hpp"
 
 namespace moldloft::test {
 

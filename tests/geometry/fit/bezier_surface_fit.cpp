@@ -1,15 +1,15 @@
 #include "geometry/fit/bezier_surface_fit.hpp"
 
-#include <doctest/doctest.h>
+#include "bench/literal_matching.hpp"
+#include "geometry/splines/bernstein_form.hpp"
 
 #include <Eigen/LU>
 #include <Eigen/SVD>
+#include <doctest/doctest.h>
+
 #include <cmath>
 #include <limits>
 #include <random>
-
-#include "bench/literal_matching.hpp"
-#include "geometry/splines/bernstein_form.hpp"
 
 using namespace moldloft;
 using namespace moldloft::geometry;

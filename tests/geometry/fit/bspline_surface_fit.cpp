@@ -1,15 +1,15 @@
 #include "geometry/fit/bspline_surface_fit.hpp"
 
-#include <doctest/doctest.h>
+#include "geometry/splines/bernstein_form.hpp"
 
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SVD>
+#include <doctest/doctest.h>
+
 #include <cmath>
 #include <limits>
 #include <random>
-
-#include "geometry/splines/bernstein_form.hpp"
 
 using namespace moldloft::geometry;
 using Eigen::MatrixX3d, Eigen::MatrixXd, Eigen::Vector2d, Eigen::Vector3d;

@@ -1,5 +1,10 @@
 #include "geometry/fit/carrier.hpp"
 
+#include "geometry/cad/face_quadrature.hpp"
+#include "geometry/fit/plates_on_carriers.hpp"
+#include "geometry/outline_shapes.hpp"
+#include "geometry/splines/closed_polygon.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -7,11 +12,6 @@
 #include <limits>
 #include <numbers>
 #include <random>
-
-#include "geometry/cad/face_quadrature.hpp"
-#include "geometry/fit/plates_on_carriers.hpp"
-#include "geometry/outline_shapes.hpp"
-#include "geometry/splines/closed_polygon.hpp"
 
 using namespace moldloft;
 using namespace moldloft::geometry;

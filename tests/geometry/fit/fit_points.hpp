@@ -1,12 +1,13 @@
 // Scattered heights and the slow, dense solution of their least-squares fit, for tests of the fast one.
 #pragma once
 
-#include <Eigen/QR>
-#include <random>
-#include <vector>
-
 #include "geometry/fit/point_columns.hpp"
 #include "geometry/splines/bspline.hpp"
+
+#include <Eigen/QR>
+
+#include <random>
+#include <vector>
 
 namespace moldloft::test {
 

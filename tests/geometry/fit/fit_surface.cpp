@@ -1,10 +1,10 @@
 #include "geometry/fit/fit_surface.hpp"
 
+#include "geometry/fit/fit_points.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
-
-#include "geometry/fit/fit_points.hpp"
 
 using namespace moldloft;
 using namespace moldloft::geometry;

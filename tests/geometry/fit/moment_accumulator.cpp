@@ -1,11 +1,11 @@
 #include "geometry/fit/moment_accumulator.hpp"
 
+#include "geometry/fit/fit_points.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <cstring>
-
-#include "geometry/fit/fit_points.hpp"
 
 using namespace moldloft;
 using namespace moldloft::geometry;

@@ -1,8 +1,8 @@
 #include "geometry/fit/net_equations.hpp"
 
+#include <Eigen/Cholesky>
 #include <doctest/doctest.h>
 
-#include <Eigen/Cholesky>
 #include <random>
 
 using namespace moldloft::geometry;

@@ -1,13 +1,13 @@
 #include "geometry/fit/parameter_correction.hpp"
 
+#include "geometry/polynomial_surface.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <numbers>
 #include <random>
 #include <set>
-
-#include "geometry/polynomial_surface.hpp"
 
 using namespace moldloft;
 using namespace moldloft::geometry;

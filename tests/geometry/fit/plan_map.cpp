@@ -1,13 +1,13 @@
 #include "geometry/fit/plan_map.hpp"
 
+#include "geometry/heap_watch.hpp"
+#include "geometry/outline_shapes.hpp"
+
 #include <doctest/doctest.h>
 
 #include <chrono>
 #include <cmath>
 #include <random>
-
-#include "geometry/heap_watch.hpp"
-#include "geometry/outline_shapes.hpp"
 
 using namespace moldloft;
 using Eigen::Vector2d;

@@ -1,13 +1,13 @@
 // The stated bounds of PlanMap::invert on outlines that are skewed and bent at random, and of PlanMap::check
 // on those that are no map.
+#include "geometry/fit/plan_map.hpp"
+#include "geometry/outline_shapes.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <limits>
 #include <random>
-
-#include "geometry/fit/plan_map.hpp"
-#include "geometry/outline_shapes.hpp"
 
 using namespace moldloft;
 using Eigen::Vector2d;

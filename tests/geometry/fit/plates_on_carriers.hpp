@@ -1,6 +1,9 @@
 // Plates that are not four-sided, measured with noise and fitted over their carriers.
 #pragma once
 
+#include "geometry/fit/carrier.hpp"
+#include "geometry/fit/surface_fit.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
@@ -8,9 +11,6 @@
 #include <random>
 #include <string>
 #include <vector>
-
-#include "geometry/fit/carrier.hpp"
-#include "geometry/fit/surface_fit.hpp"
 
 namespace moldloft::test {
 

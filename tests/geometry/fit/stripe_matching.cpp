@@ -1,12 +1,12 @@
 #include "geometry/fit/stripe_matching.hpp"
 
-#include <doctest/doctest.h>
-
-#include <random>
-
 #include "bench/literal_matching.hpp"
 #include "geometry/splines/bernstein_form.hpp"
 #include "geometry/splines/span_restriction.hpp"
+
+#include <doctest/doctest.h>
+
+#include <random>
 
 using namespace moldloft;
 using namespace moldloft::geometry;

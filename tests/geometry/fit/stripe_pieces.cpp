@@ -1,12 +1,12 @@
 #include "geometry/fit/stripe_pieces.hpp"
 
+#include "geometry/splines/bspline.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <limits>
 #include <random>
-
-#include "geometry/splines/bspline.hpp"
 
 using namespace moldloft::geometry;
 using Eigen::Vector2d;

@@ -1,17 +1,17 @@
 #include "geometry/fit/surface_fit.hpp"
 
-#include <doctest/doctest.h>
+#include "geometry/heap_watch.hpp"
+#include "geometry/outline_shapes.hpp"
 
 #include <Eigen/Cholesky>
+#include <doctest/doctest.h>
+
 #include <chrono>
 #include <cmath>
 #include <functional>
 #include <numbers>
 #include <random>
 #include <string>
-
-#include "geometry/heap_watch.hpp"
-#include "geometry/outline_shapes.hpp"
 
 using namespace moldloft;
 using Eigen::MatrixXd, Eigen::Vector2d, Eigen::Vector3d, Eigen::VectorXd;

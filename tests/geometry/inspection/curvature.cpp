@@ -1,14 +1,14 @@
 #include "geometry/inspection/curvature.hpp"
 
+#include "geometry/polynomial_surface.hpp"
+#include "geometry/rigid_motion.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <numbers>
 #include <random>
 #include <vector>
-
-#include "geometry/polynomial_surface.hpp"
-#include "geometry/rigid_motion.hpp"
 
 using namespace moldloft;
 using Eigen::Vector2d, Eigen::Vector3d;

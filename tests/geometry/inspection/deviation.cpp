@@ -1,13 +1,13 @@
 #include "geometry/inspection/deviation.hpp"
 
+#include "geometry/heap_watch.hpp"
+#include "geometry/inspection/known_surfaces.hpp"
+#include "geometry/inspection/localization.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <limits>
-
-#include "geometry/heap_watch.hpp"
-#include "geometry/inspection/known_surfaces.hpp"
-#include "geometry/inspection/localization.hpp"
 
 using namespace moldloft::geometry;
 using namespace moldloft::test;

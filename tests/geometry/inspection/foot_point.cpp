@@ -1,11 +1,11 @@
 #include "geometry/inspection/foot_point.hpp"
 
+#include "geometry/heap_watch.hpp"
+#include "geometry/inspection/known_surfaces.hpp"
+
 #include <doctest/doctest.h>
 
 #include <limits>
-
-#include "geometry/heap_watch.hpp"
-#include "geometry/inspection/known_surfaces.hpp"
 
 using namespace moldloft::geometry;
 using namespace moldloft::test;

@@ -1,13 +1,13 @@
 #include "geometry/inspection/isolines.hpp"
 
+#include "geometry/polynomial_surface.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <random>
-
-#include "geometry/polynomial_surface.hpp"
 
 using namespace moldloft;
 using namespace moldloft::geometry;

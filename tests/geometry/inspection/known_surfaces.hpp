@@ -2,12 +2,12 @@
 // precision.
 #pragma once
 
+#include "geometry/rigid_motion.hpp"
+#include "geometry/splines/bspline.hpp"
+
 #include <cmath>
 #include <random>
 #include <vector>
-
-#include "geometry/rigid_motion.hpp"
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::test {
 

@@ -1,12 +1,12 @@
 #include "geometry/inspection/least_distance.hpp"
 
-#include <doctest/doctest.h>
+#include "geometry/heap_watch.hpp"
+
 #include <Eigen/QR>
+#include <doctest/doctest.h>
 
 #include <random>
 #include <vector>
-
-#include "geometry/heap_watch.hpp"
 
 using namespace moldloft::geometry;
 using namespace moldloft::test;

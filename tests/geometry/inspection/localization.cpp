@@ -1,12 +1,12 @@
 #include "geometry/inspection/localization.hpp"
 
-#include <doctest/doctest.h>
+#include "geometry/inspection/known_surfaces.hpp"
+
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <doctest/doctest.h>
 
 #include <algorithm>
-
-#include "geometry/inspection/known_surfaces.hpp"
 
 using namespace moldloft::geometry;
 using namespace moldloft::test;

@@ -1,11 +1,11 @@
 // One-sided localization: no point through the surface, and nothing closer is possible.
-#include <doctest/doctest.h>
-#include <Eigen/QR>
-
-#include <algorithm>
-
 #include "geometry/inspection/known_surfaces.hpp"
 #include "geometry/inspection/localization.hpp"
+
+#include <Eigen/QR>
+#include <doctest/doctest.h>
+
+#include <algorithm>
 
 using namespace moldloft::geometry;
 using namespace moldloft::test;

@@ -1,8 +1,8 @@
 #include "geometry/inspection/point_plane_system.hpp"
 
-#include <doctest/doctest.h>
-
 #include "geometry/inspection/known_surfaces.hpp"
+
+#include <doctest/doctest.h>
 
 using namespace moldloft::geometry;
 using namespace moldloft::test;

@@ -1,16 +1,16 @@
 #include "geometry/splines/band_cholesky.hpp"
 
-#include <doctest/doctest.h>
+#include "geometry/heap_watch.hpp"
+#include "geometry/splines/band_condition.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <doctest/doctest.h>
+
 #include <cstring>
 #include <limits>
 #include <random>
 #include <vector>
-
-#include "geometry/heap_watch.hpp"
-#include "geometry/splines/band_condition.hpp"
 
 using namespace moldloft;
 using namespace moldloft::geometry;

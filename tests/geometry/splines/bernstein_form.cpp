@@ -1,12 +1,12 @@
 #include "geometry/splines/bernstein_form.hpp"
 
+#include "geometry/splines/bernstein.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <limits>
 #include <random>
-
-#include "geometry/splines/bernstein.hpp"
 
 using namespace moldloft::geometry;
 

@@ -1,12 +1,12 @@
 #include "geometry/splines/bspline.hpp"
 
+#include "geometry/heap_watch.hpp"
+#include "geometry/splines/spline_samples.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <random>
-
-#include "geometry/heap_watch.hpp"
-#include "geometry/splines/spline_samples.hpp"
 
 using namespace moldloft::geometry;
 

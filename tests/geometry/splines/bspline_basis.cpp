@@ -1,9 +1,9 @@
 #include "geometry/splines/bspline_basis.hpp"
 
-#include <doctest/doctest.h>
-
 #include "geometry/splines/bernstein_form.hpp"
 #include "geometry/splines/spline_samples.hpp"
+
+#include <doctest/doctest.h>
 
 using namespace moldloft::geometry;
 using samples::eps, samples::Numbers;

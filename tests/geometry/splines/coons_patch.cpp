@@ -1,9 +1,9 @@
 #include "geometry/splines/coons_patch.hpp"
 
-#include <doctest/doctest.h>
-
 #include "geometry/splines/refinement.hpp"
 #include "geometry/splines/spline_samples.hpp"
+
+#include <doctest/doctest.h>
 
 using namespace moldloft::geometry;
 using samples::eps, samples::Numbers;

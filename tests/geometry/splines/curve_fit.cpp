@@ -1,11 +1,10 @@
 #include "geometry/splines/curve_fit.hpp"
 
-#include <doctest/doctest.h>
+#include "geometry/splines/spline_samples.hpp"
 
 #include <Eigen/QR>
 #include <Eigen/SVD>
-
-#include "geometry/splines/spline_samples.hpp"
+#include <doctest/doctest.h>
 
 using namespace moldloft::geometry;
 using samples::eps, samples::Numbers;

@@ -1,8 +1,8 @@
 #include "geometry/splines/derived_curves.hpp"
 
-#include <doctest/doctest.h>
-
 #include "geometry/splines/spline_samples.hpp"
+
+#include <doctest/doctest.h>
 
 using namespace moldloft::geometry;
 using samples::eps, samples::exact, samples::Numbers;

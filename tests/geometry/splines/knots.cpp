@@ -1,11 +1,11 @@
 #include "geometry/splines/knots.hpp"
 
+#include "geometry/splines/spline_samples.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <limits>
-
-#include "geometry/splines/spline_samples.hpp"
 
 using namespace moldloft::geometry;
 using samples::Numbers;

@@ -1,12 +1,11 @@
 #include "geometry/splines/lofting.hpp"
 
-#include <doctest/doctest.h>
-
-#include <Eigen/SVD>
-
 #include "geometry/splines/derived_curves.hpp"
 #include "geometry/splines/refinement.hpp"
 #include "geometry/splines/spline_samples.hpp"
+
+#include <Eigen/SVD>
+#include <doctest/doctest.h>
 
 using namespace moldloft::geometry;
 using samples::eps, samples::Numbers;

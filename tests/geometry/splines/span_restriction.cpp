@@ -1,11 +1,11 @@
 #include "geometry/splines/span_restriction.hpp"
 
+#include "geometry/splines/bernstein.hpp"
+#include "geometry/splines/bspline.hpp"
+
 #include <doctest/doctest.h>
 
 #include <random>
-
-#include "geometry/splines/bernstein.hpp"
-#include "geometry/splines/bspline.hpp"
 
 using namespace moldloft::geometry;
 

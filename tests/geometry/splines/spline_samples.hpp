@@ -2,13 +2,13 @@
 // precision.
 #pragma once
 
+#include "geometry/splines/bspline.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
 #include <vector>
-
-#include "geometry/splines/bspline.hpp"
 
 namespace moldloft::geometry::samples {
 

@@ -1,13 +1,13 @@
 #include "geometry/splines/stripe_joining.hpp"
 
+#include "geometry/splines/curve_fit.hpp"
+#include "geometry/splines/lofting.hpp"
+#include "geometry/splines/spline_samples.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cmath>
-
-#include "geometry/splines/curve_fit.hpp"
-#include "geometry/splines/lofting.hpp"
-#include "geometry/splines/spline_samples.hpp"
 
 using namespace moldloft::geometry;
 using samples::Numbers;

@@ -1,10 +1,10 @@
 #include "geometry/splines/trimmed_surface.hpp"
 
+#include "geometry/cad/sample_faces.hpp"
+
 #include <doctest/doctest.h>
 
 #include <limits>
-
-#include "geometry/cad/sample_faces.hpp"
 
 using namespace moldloft;
 using namespace moldloft::geometry;

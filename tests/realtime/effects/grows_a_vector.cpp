@@ -1,8 +1,8 @@
 // Must not compile: a background task that grows a vector in its step.
-#include <vector>
-
 #include "hal/realtime.hpp"
 #include "tasks/scheduler.hpp"
+
+#include <vector>
 
 namespace {
 

@@ -1,8 +1,8 @@
 // Must compile: a background task that works in memory that it has.
-#include <vector>
-
 #include "hal/realtime.hpp"
 #include "tasks/scheduler.hpp"
+
+#include <vector>
 
 namespace {
 

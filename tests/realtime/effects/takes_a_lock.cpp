@@ -1,8 +1,8 @@
 // Must not compile: a task that takes a lock.
-#include <mutex>
-
 #include "hal/realtime.hpp"
 #include "tasks/scheduler.hpp"
+
+#include <mutex>
 
 namespace {
 

@@ -1,7 +1,7 @@
 // Must not compile: a byte link that reads a descriptor without a word on why it comes back at once.
-#include <unistd.h>
-
 #include "hal/byte_link.hpp"
+
+#include <unistd.h>
 
 namespace {
 
