@@ -1,5 +1,5 @@
-// surface.step and surface.igs: the measured surface for CAD systems, untrimmed, in millimetres and world
-// coordinates.
+// surface.step and surface.igs: the measured surface for CAD systems, untrimmed, in millimetres
+// and world coordinates.
 //
 // The bytes depend on the surface and on what is passed in, never on the time of writing: the time stamp in
 // the files is the moment when the run began. A simulated run has none, and its files say 1970-01-01.

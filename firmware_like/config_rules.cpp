@@ -177,8 +177,8 @@ MaybeFinding scan_overlap(const CellConfig& c) {
       fmt::format("[scan] overlap_mm: {} is more than half of [scanner] field_mm", c.scan_overlap_mm));
 }
 
-// The next field is centred on the boundary's continuation: with more overlap than this the tracker would hardly
-// advance.
+// The next field is centred on the boundary's continuation: with more overlap than this the tracker
+// would hardly advance.
 MaybeFinding tracking_overlap(const CellConfig& c) {
   if (2 * c.tracking_overlap_mm <= 0.9 * smaller_field(c)) return {};
   return error({"tracking.overlap_mm", "scanner.field_mm"},

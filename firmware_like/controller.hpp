@@ -1,9 +1,9 @@
 // The controller put together: drivers on their links, the cell, the background fit, the task table. The same
 // object runs on real devices and in simulation; only clock and links differ.
 //
-// Thread       constructed anywhere; start() and tick() on the control thread; cell().command() and
-//              progress() anywhere; recorder().drain() on one other thread (or between ticks, in virtual
-//              time)
+// Thread       constructed anywhere; start() and tick() on the control thread; cell().command()
+//              and progress() anywhere; recorder().drain() on one other thread (or between ticks,
+//              in virtual time)
 // Blocking     tick() sleeps until the next tick and not otherwise
 // Allocation   in the constructor and in start() (links are opened); none in tick()
 // Failure      the constructor throws nothing; what goes wrong shows in the cell's state and why()

@@ -66,8 +66,8 @@ void DisplayThread::show(const tasks::CellProgress& p) {
                     terminal_ ? "\r\x1b[K" : ""));
   }
   if (terminal_) {
-    // The last column stays free: a line that fills it would wrap on some terminals. Asked each time, since windows are
-    // resized.
+    // The last column stays free: a line that fills it would wrap on some terminals. Asked each time, since
+    // windows are resized.
     const auto columns = terminal_columns(STDERR_FILENO, std::getenv("COLUMNS"));
     say(fmt::format("\r\x1b[K{}", progress_line_within(std::max<std::size_t>(columns, 2) - 1, p, around_)));
     return;

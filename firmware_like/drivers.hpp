@@ -1,5 +1,5 @@
-// The factory of drivers: which class answers to which `driver` in the configuration. A new make is one line
-// here.
+// The factory of drivers: which class answers to which `driver` in the configuration. A new make is
+// one line here.
 #pragma once
 
 #include "firmware_like/config.hpp"

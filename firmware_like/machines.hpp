@@ -1,6 +1,6 @@
-// The state machines of tasks/ as diagrams, drawn from the tables themselves: `moldloft machines` prints
-// them, and tasks/README.md holds exactly that (a test compares), so the pictures cannot fall behind the
-// code.
+// The state machines of tasks/ as diagrams, drawn from the tables themselves: `moldloft machines`
+// prints them, and tasks/README.md holds exactly that (a test compares), so the pictures cannot fall
+// behind the code.
 //
 // Guards are functions without a name at run time. They are told by what they ask for: each is tried with one after
 // another of the context's counters not yet used up; a row that always agrees, after others of the same state and

@@ -5,8 +5,8 @@
 //   start hold unhold stop abort clear reset      "done: Held -> Starting", or "refused: ..." and why
 //   status                                        one line of JSON
 //
-// Thread       OperatorThread is an ordinary thread; it reaches the control thread through Cell::command() and
-//              progress() only
+// Thread       OperatorThread is an ordinary thread; it reaches the control thread through Cell::command()
+//              and progress() only
 // Blocking     every wait has a limit
 // Failure      one line
 #pragma once
@@ -27,8 +27,8 @@ namespace moldloft::firmware_like {
 // All words that a cell knows, for people: "start, hold, ..., status".
 std::string operator_words();
 
-// What a word is answered with. `let_time_pass` is called, some ten times at most, while the control loop takes the
-// command up.
+// What a word is answered with. `let_time_pass` is called, some ten times at most, while the control loop takes
+// the command up.
 std::string answer_to(std::string_view word, tasks::Cell&, const std::function<void()>& let_time_pass);
 std::string status_json(const tasks::CellProgress&);
 

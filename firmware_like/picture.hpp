@@ -1,6 +1,6 @@
-// The overview of a run as SVG: the plate in plan view, once with its shape in colour, once with the
-// deviation, each with a scale; over them the outline, the tracker's path and the shots. World coordinates,
-// mm.
+// The overview of a run as SVG: the plate in plan view, once with its shape in colour, once with
+// the deviation, each with a scale; over them the outline, the tracker's path and the shots.
+// World coordinates, mm.
 //
 // Set-up and result time only: allocates.
 #pragma once

@@ -1,5 +1,5 @@
-// The ordinary thread that empties the recorder's rings onto the disk every few milliseconds, and writes the flight
-// recorder's dumps.
+// The ordinary thread that empties the recorder's rings onto the disk every few milliseconds, and writes the
+// flight recorder's dumps.
 #pragma once
 
 #include "firmware_like/flight_files.hpp"

@@ -37,9 +37,9 @@ std::string about_run(const Json& summary);
 
 Json summary_of(const Controller&, const RunLabel&);
 
-// Everything that can be written for the state that the run is in: a run that did not complete has no
-// surface. `error_field`, when given, is what the picture's second panel shows instead of the fit's
-// residuals.
+// Everything that can be written for the state that the run is in: a run that did not complete
+// has no surface. `error_field`, when given, is what the picture's second panel shows instead of
+// the fit's residuals.
 std::expected<void, RunError> write_results(const Controller&, const RunFolder&, const RunLabel&,
                                             const Json& summary,
                                             const std::optional<PlateField>& error_field = {});

@@ -1,7 +1,7 @@
-// For functions that run inside a real-time loop, a piece a step: they neither allocate nor wait once their object is
-// built. MOLDLOFT_GEOMETRY_NONBLOCKING says so to Clang, whose -Wfunction-effects then refuses to compile a call of
-// anything that might, and whose RealtimeSanitizer stops the program where it happens all the same. Other compilers
-// see nothing.
+// For functions that run inside a real-time loop, a piece a step: they neither allocate nor wait once their object
+// is built. MOLDLOFT_GEOMETRY_NONBLOCKING says so to Clang, whose -Wfunction-effects then refuses to compile a call
+// of anything that might, and whose RealtimeSanitizer stops the program where it happens all the same. Other
+// compilers see nothing.
 //
 // MOLDLOFT_GEOMETRY_CHECKED_AT_RUN_TIME stands at the head of a source file whose bodies the compiler cannot see
 // through, with the reason: branches of Eigen and of the standard library that allocate or throw for sizes which do

@@ -11,8 +11,8 @@ namespace moldloft::geometry {
 
 namespace {
 
-// Below this pitch (rad, or this far from pi) yaw and roll turn about the same axis as far as a pose can
-// tell.
+// Below this pitch (rad, or this far from pi) yaw and roll turn about the same axis as far as a
+// pose can tell.
 constexpr double gimbal_pitch = 1e-9;
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Which vector instructions a kernel may use: one binary carries every variant, and the machine picks at
-// run time.
+// Which vector instructions a kernel may use: one binary carries every variant, and the machine picks
+// at run time.
 //
 // A kernel is written once, in a .inc file, on the compiler's vector extension, and included once a variant by
 // simd_variants.inc, which sets

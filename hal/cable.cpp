@@ -95,8 +95,8 @@ class Wire {
   }
 
   std::vector<std::byte> bytes_;
-  // Writes that are not back to back and not yet read: a tick writes once, so this is seconds of a stalled
-  // reader.
+  // Writes that are not back to back and not yet read: a tick writes once, so this is seconds of
+  // a stalled reader.
   std::vector<Stretch> stretches_{4096};
   std::size_t first_stretch_ = 0, stretch_count_ = 0;
   std::uint64_t written_ = 0, read_ = 0;
@@ -106,9 +106,9 @@ class Wire {
 
 }  // namespace
 
-// What both ends share. Every successful open() of the host starts a new connection with empty wires; the
-// device learns of it by seeing `lost` once, as a server sees its old connection end before it accepts the
-// next.
+// What both ends share. Every successful open() of the host starts a new connection with empty wires;
+// the device learns of it by seeing `lost` once, as a server sees its old connection end before it
+// accepts the next.
 struct Cable::Ends {
   class End final : public ByteLink {
    public:

@@ -1,5 +1,5 @@
-// A simulated cable: two byte links that are each other's far end, with a rate and a delay, in the time of a
-// clock.
+// A simulated cable: two byte links that are each other's far end, with a rate and a delay, in the time
+// of a clock.
 //
 // Thread       one thread
 // Blocking     never

@@ -16,8 +16,8 @@ namespace {
 static_assert(std::endian::native == std::endian::little,
               "slices are taken from a word as it lies in memory");
 
-// Slice-by-8 (Intel, 2006): table k gives the effect of a byte that has k more bytes behind it in the same
-// word.
+// Slice-by-8 (Intel, 2006): table k gives the effect of a byte that has k more bytes behind it in
+// the same word.
 using Tables = std::array<std::array<std::uint32_t, 256>, 8>;
 
 consteval Tables make_tables() {

@@ -7,9 +7,9 @@
 // Blocking     never, but dump() writes to a file
 // Allocation   in the constructor only
 // Cost         note() about 3 ns: 16 bytes into a ring
-// Failure      a trigger while another is being dumped, or too soon after it, is counted in later_triggers() and
-//              otherwise ignored; after `dumps` dumps triggers are ignored, so that a sick machine does not fill
-//              its disk
+// Failure      a trigger while another is being dumped, or too soon after it, is counted in later_triggers()
+//              and otherwise ignored; after `dumps` dumps triggers are ignored, so that a sick machine does not
+//              fill its disk
 #pragma once
 
 #include "hal/flight_dump.hpp"
@@ -30,8 +30,8 @@ class FlightRecorder {
     std::size_t transitions = 64;
     std::uint32_t ticks_after = 20;  // from the trigger to the freeze
     std::uint32_t dumps = 8;         // of one run; the last two are kept for aborts and requests
-    // Between two overruns or missed ticks that are dumped: a sick machine must not spend all dumps on its first
-    // second.
+    // Between two overruns or missed ticks that are dumped: a sick machine must not spend all dumps on
+    // its first second.
     Duration quiet = std::chrono::seconds{2};
   };
 

@@ -70,8 +70,7 @@ struct LineRobot::Transition {
 using D = LineRobot;
 
 // First match counts; a pair that is not listed is ignored (an answer that comes twice, a reset where none is
-// needed).
-// clang-format off
+// needed). clang-format off
 const LineRobot::Transition LineRobot::transitions[] = {
     // from            cue                guard            action                       to
     {Phase::idle,      Cue::start,        &D::always,      &D::open_link,               Phase::opening},
@@ -294,8 +293,8 @@ void LineRobot::resend_command(Instant now) {
   send(command_, now);
 }
 
-// The robot is there and stands, yet no answer came: nothing but a bad line explains it, and the line may go
-// on.
+// The robot is there and stands, yet no answer came: nothing but a bad line explains it, and the line
+// may go on.
 void LineRobot::resend_afresh(Instant now) {
   resends_ = 0;
   resend_command(now);
@@ -317,8 +316,8 @@ void LineRobot::report_refused(Instant) {
       {.kind = RobotEvent::Kind::refused, .pose = pose_, .code = code_, .text = text_of_error(code_)});
 }
 
-// Whether the robot ever saw the command is unknown, and so is the number that it expects next: SYN settles
-// both.
+// Whether the robot ever saw the command is unknown, and so is the number that it expects next:
+// SYN settles both.
 void LineRobot::report_stopped_and_sync(Instant now) {
   code_ = std::to_underlying(Error::stopped);
   report_refused(now);
@@ -389,8 +388,8 @@ void LineRobot::take_line(std::string_view line, Instant now) {
   reply->number == 0 ? on_answer(*reply, now) : on_numbered(*reply, now);
 }
 
-// Whatever it was, the same line again brings it back; soon, but not so soon that noise and repeats feed each
-// other.
+// Whatever it was, the same line again brings it back; soon, but not so soon that noise and repeats
+// feed each other.
 void LineRobot::garbled(std::string_view line, Flaw flaw, Instant now) {
   ++garbled_lines_;
   flaw_ = flaw;

@@ -1,8 +1,7 @@
 // The scanner's wire, PSC1, as pure functions on bytes. The specification is PROTOCOLS.md; this is its code.
 //
-// Both sides use these functions: the driver of the cell and the device server of the simulation.
-// Little-endian. Every message is a header of 32 bytes, a payload, and the payload's CRC-32C (absent when the payload
-// is empty).
+// Both sides use these functions: the driver of the cell and the device server of the simulation. Little-endian.
+// Every message is a header of 32 bytes, a payload, and the payload's CRC-32C (absent when the payload is empty).
 //
 // Thread       any: no state
 // Allocation   none; encoders write into the caller's buffer
@@ -144,8 +143,8 @@ std::size_t encode_empty(std::uint32_t request_id, Type,
                          std::span<std::byte> out) noexcept
     MOLDLOFT_NONBLOCKING;  // PING, RESET, STATUS request
 
-// A frame as it goes over the wire. int16 takes scale and offset from the extent that `field` gives (+-x,
-// +-y, +-depth).
+// A frame as it goes over the wire. int16 takes scale and offset from the extent that `field` gives
+// (+-x, +-y, +-depth).
 std::size_t encoded_frame_size(const Frame&, Encoding, bool intensity) noexcept;
 std::size_t encode_frame(std::uint32_t request_id, const Frame&, Encoding, bool intensity,
                          const std::array<float, 3>& half_extent_mm, std::span<std::byte> out) noexcept;

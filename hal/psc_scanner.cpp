@@ -13,8 +13,8 @@ using namespace psc1;
 
 namespace {
 
-// A FRAME payload of this many stripes and points in the larger encoding, with its CRC (PROTOCOLS.md,
-// "FRAME").
+// A FRAME payload of this many stripes and points in the larger encoding, with its
+// CRC (PROTOCOLS.md, "FRAME").
 constexpr std::size_t largest_body(std::uint32_t stripes, std::uint32_t points) {
   return 48 + std::size_t{12} * stripes + std::size_t{13} * points + payload_crc_size;
 }
@@ -35,8 +35,7 @@ struct PscScanner::Transition {
 using D = PscScanner;
 
 // First match counts; a pair that is not listed is ignored (a late answer to a question that nobody asks any
-// more).
-// clang-format off
+// more). clang-format off
 const PscScanner::Transition PscScanner::transitions[] = {
     // from              cue                guard             action                    to
     {Phase::idle,        Cue::start,        &D::always,       &D::open_link,            Phase::opening},

@@ -39,8 +39,8 @@ class PscScanner final : public Scanner {
     Duration last_back_off = 2s;      // a scanner that has booted is found within this time
     int retries = 2;                  // of one shot, after the first attempt
 
-    // A quarter of a tick of a 1 Gb/s line, three ticks of a 100 Mb/s line; with points_a_tick it bounds what one
-    // receive() costs.
+    // A quarter of a tick of a 1 Gb/s line, three ticks of a 100 Mb/s line; with points_a_tick it bounds what
+    // one receive() costs.
     std::size_t bytes_a_tick = 32u << 10;
     std::size_t points_a_tick = 2048;  // unpacked by receive() where nobody asks for them
     std::uint32_t max_stripes = 200;   // of one frame; a sensor with larger ones is refused at HELLO

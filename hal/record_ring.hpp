@@ -64,8 +64,8 @@ class RecordRing {
 
   std::vector<std::byte> ring_;
   std::vector<std::byte> scratch_;  // the reader's: a record in one piece
-  // Bytes ever written and ever released; on lines of their own, so that the two threads do not fight over
-  // one.
+  // Bytes ever written and ever released; on lines of their own, so that the two threads do not
+  // fight over one.
   alignas(64) std::atomic<std::uint64_t> written_{0};
   std::atomic<std::size_t> high_water_{0};
   alignas(64) std::atomic<std::uint64_t> released_{0};

@@ -33,8 +33,8 @@ constexpr std::array<std::pair<Refusal, std::string_view>, 3> refusals{
     {{Refusal::checksum, "CK"}, {Refusal::sequence, "SQ"}, {Refusal::not_synchronised, "SY"}}};
 
 constexpr std::int64_t largest_code = 999'999;
-// Six digits before the point: 999.999 m and 999,999 degrees are far beyond any arm, and six such fields fit
-// a line.
+// Six digits before the point: 999.999 m and 999,999 degrees are far beyond any arm, and six such fields
+// fit a line.
 constexpr std::int64_t largest_thousandths = 999'999'999;
 
 std::string_view name_of(Verb verb) {

@@ -62,8 +62,8 @@ class SerialLink final : public ByteLink {
         answered_at_once([&] { return answer_of(sp_nonblocking_write(port_, in.data(), in.size())); }));
   }
 
-  // A port that is gone reads as 0 bytes, like a silent one: only the hang-up on its handle tells the two
-  // apart.
+  // A port that is gone reads as 0 bytes, like a silent one: only the hang-up on its handle tells
+  // the two apart.
   LinkState state() noexcept override {
     if (state_ != LinkState::open) return state_;
     const bool hung_up = answered_at_once([&] {

@@ -1,5 +1,5 @@
-// One prepared statement of SQLite: values in by position, columns out by position, never a string put
-// together.
+// One prepared statement of SQLite: values in by position, columns out by position, never a
+// string put together.
 //
 // Thread       that of its database
 // Blocking     step() may write to disk

@@ -19,8 +19,8 @@ namespace {
 
 using asio::ip::tcp;
 
-// Reads the hosts file alone. getaddrinfo() would ask a name server, which can take its time-out of many
-// seconds.
+// Reads the hosts file alone. getaddrinfo() would ask a name server, which can take its time-out
+// of many seconds.
 std::optional<asio::ip::address> from_hosts_file(const std::string& name) {
   std::optional<asio::ip::address> found;
   sethostent(0);

@@ -1,6 +1,6 @@
 // The controller's configuration for a simulated cell: what the people who set such a cell up would write
-// into its cell.toml. They know the arm, the nominal mount and about where a plate is laid; they do not know
-// the truth.
+// into its cell.toml. They know the arm, the nominal mount and about where a plate is laid; they do not
+// know the truth.
 #pragma once
 
 #include "firmware_like/config.hpp"

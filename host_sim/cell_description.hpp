@@ -1,5 +1,5 @@
-// What a simulated cell consists of, as one chooses it: plate, arm, scanner, mount, seed. Defaults are the
-// thesis's cell.
+// What a simulated cell consists of, as one chooses it: plate, arm, scanner, mount, seed. Defaults are
+// the thesis's cell.
 //
 // The seed draws where the plate lies: its centre of area within 30 mm (x) and 60 mm (y) of the middle of the
 // cell, less for small plates so that the scanner's start over the middle sees plate everywhere, turned by

@@ -20,8 +20,8 @@ using geometry::BSplineSurface;
 
 Eigen::Vector2d clamped(const Eigen::Vector2d& uv) { return uv.cwiseMax(0.0).cwiseMin(1.0); }
 
-// (u, v) of the surface's point over a plan position, Newton from `guess`; nothing when there is none in the
-// domain.
+// (u, v) of the surface's point over a plan position, Newton from `guess`; nothing when there is none
+// in the domain.
 std::optional<Eigen::Vector2d> over(const BSplineSurface& surface, const Eigen::Vector2d& plan,
                                     Eigen::Vector2d uv) {
   for (int step = 0; step < 30; ++step) {

@@ -1,5 +1,5 @@
-// The truth comparison: a measured surface and outline against the plate as it is, in world coordinates,
-// nothing aligned.
+// The truth comparison: a measured surface and outline against the plate as it is, in world
+// coordinates, nothing aligned.
 //
 // Normal deviations are taken on a grid of 101 x 101 over the plate's four corners, where a grid point lies
 // inside both outlines: the distance along the true surface's normal to the measured surface, positive where

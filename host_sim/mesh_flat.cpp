@@ -26,8 +26,8 @@ double plan_area(const TriangleMesh& mesh, const Triangle& t) {
   return 0.5 * ((b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x()));
 }
 
-// Principal axes of the surface, each triangle weighing by its area: z along the normals, x along the long
-// side.
+// Principal axes of the surface, each triangle weighing by its area: z along the normals, x along
+// the long side.
 Eigen::Matrix3d flat_axes(const TriangleMesh& mesh, Eigen::Vector3d& middle) {
   Eigen::Vector3d normals = Eigen::Vector3d::Zero(), sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();

@@ -161,8 +161,8 @@ void Optics::expose(const PlateInstance& plate, const geometry::RigidMotion& wor
   const double x_edge = 0.5 * settings_.field_x_mm;
   PlanWindow window = exposure.window(-x_edge, x_edge);
   w.cast.edges_within(window, w.cast.all_edges(), w.near_frame);
-  // A line of sight leaves the slab at most this far from its foot: it leans no more than camera and field
-  // together.
+  // A line of sight leaves the slab at most this far from its foot: it leans no more than camera
+  // and field together.
   const double lean = (farthest + settings_.field_x_mm + settings_.field_y_mm) / (0.8 * settings_.height_mm);
   const double reach = lean * (w.cast.z_max() - w.cast.table_z());
   const Eigen::Vector2d around = Eigen::Vector2d::Constant(reach);

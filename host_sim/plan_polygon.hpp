@@ -24,8 +24,8 @@ double distance_to_outline(PlanPoints, const Eigen::Vector2d&) noexcept;
 std::vector<Eigen::Vector2d> convex_hull(PlanPoints);
 
 // The four hull vertices that span the quadrilateral of largest area, counter-clockwise, beginning with the
-// one of smallest x + y: what one calls the corners of an approximately four-sided outline. Cost quadratic in the
-// hull's vertices.
+// one of smallest x + y: what one calls the corners of an approximately four-sided outline. Cost quadratic in
+// the hull's vertices.
 std::array<Eigen::Vector2d, 4> largest_quadrilateral(PlanPoints);
 
 // Points along the closed outline, at most `step_mm` apart, all vertices among them.

@@ -1,5 +1,5 @@
-// The robot's end of a serial line: the master of a pseudo-terminal, whose other side stands under a name of
-// choice.
+// The robot's end of a serial line: the master of a pseudo-terminal, whose other side stands under a
+// name of choice.
 //
 // The name is a symbolic link to the terminal's device; it is made here and taken away with the object. The state is
 // `opening` until a program has opened the device, `open` while it has, `lost` when it has closed it.

@@ -8,8 +8,8 @@ namespace moldloft::host_sim {
 
 namespace {
 
-// More crossings of one ray's short way through the slab than this do not occur with outlines that are not
-// fractal.
+// More crossings of one ray's short way through the slab than this do not occur with outlines that
+// are not fractal.
 constexpr std::size_t most_crossings = 32;
 
 struct Crossing {
@@ -77,8 +77,8 @@ void RayCast::edges_within(const PlanWindow& window, std::span<const PlanEdge> f
     const bool apart = low.x() > window.high.x() || low.y() > window.high.y() || high.x() < window.low.x() ||
                        high.y() < window.low.y();
     if (apart) continue;
-    // A long oblique edge may pass the window by although its box does not: all four corners on one side of
-    // it.
+    // A long oblique edge may pass the window by although its box does not: all four corners on one
+    // side of it.
     const auto side = [&](double x, double y) {
       return e.along.x() * (y - e.from.y()) - e.along.y() * (x - e.from.x()) > 0;
     };
@@ -101,9 +101,9 @@ double RayCast::over_top(const Ray& ray, double t) const noexcept {
   return p.z() - plate_->height(p.x(), p.y());
 }
 
-// Newton on the height over the surface, kept between `low` and `high`. A surface that is linear in pieces
-// may send it to and fro across a kink; eight steps bring it within the piece's curvature, micrometres, of
-// the crossing.
+// Newton on the height over the surface, kept between `low` and `high`. A surface that is linear in
+// pieces may send it to and fro across a kink; eight steps bring it within the piece's curvature,
+// micrometres, of the crossing.
 double RayCast::top_crossing(const Ray& ray, double low, double high, double guess) const noexcept {
   constexpr double exact_mm = 1e-6;
   double t = std::clamp(guess, low, high);
@@ -166,8 +166,8 @@ bool RayCast::hidden(const Eigen::Vector3d& point, const Eigen::Vector3d& camera
   double from = 0;
   for (std::size_t k = 0; k <= crossings.count; ++k) {
     const double to = k < crossings.count ? crossings.list[k].t : end;
-    // Inside the outline the height over the top rises from over(from) to over(to): solid if it passes
-    // [-thickness, 0].
+    // Inside the outline the height over the top rises from over(from) to over(to): solid if it
+    // passes [-thickness, 0].
     if (in && over_top(ray, from) <= 0 && over_top(ray, to) >= -thickness_) return true;
     in = !in;
     from = to;

@@ -88,8 +88,8 @@ void ScannerServer::receive(hal::Instant now) {
   }
 }
 
-// The first message of `bytes`, answered; its size, 0 while it is not all there or the connection was
-// dropped.
+// The first message of `bytes`, answered; its size, 0 while it is not all there or the
+// connection was dropped.
 std::size_t ScannerServer::take_message(std::span<const std::byte> bytes, hal::Instant now) {
   if (bytes.size() < psc1::header_size) return 0;
   const auto header = psc1::decode_header(bytes.first<psc1::header_size>());
@@ -260,8 +260,8 @@ void ScannerServer::refuse(std::uint32_t request_id, Status status, std::uint32_
   send(request_id, psc1::ErrorReply{status, shot_id, text});
 }
 
-// A payload of the wrong size breaks the stream's rules and ends the connection; a value of the wrong kind is
-// answered.
+// A payload of the wrong size breaks the stream's rules and ends the connection; a value of the wrong
+// kind is answered.
 void ScannerServer::wrong_payload(const psc1::Header& header, psc1::Flaw flaw) {
   if (flaw == psc1::Flaw::payload_size) return drop();
   refuse(header.request_id, Status::bad_argument, 0, psc1::to_string(flaw));

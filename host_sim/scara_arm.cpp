@@ -19,8 +19,8 @@ class ScaraArm final : public Arm {
   std::string_view name() const override { return "scara"; }
   const JointLimits& limits() const override { return limits_; }
 
-  // Up, elbow bent by a right angle, the tip in front of the base on the x axis, its own x axis along the
-  // world's.
+  // Up, elbow bent by a right angle, the tip in front of the base on the x axis, its own x axis
+  // along the world's.
   Joints home() const override {
     const double j2 = (s_.lefty ? -0.5 : 0.5) * std::numbers::pi;
     const double j1 = -std::atan2(s_.link_2_mm * std::sin(j2), s_.link_1_mm + s_.link_2_mm * std::cos(j2));

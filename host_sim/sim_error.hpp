@@ -1,5 +1,5 @@
-// What can go wrong when a simulated cell is set up: one line for a person that names what, where and what to
-// do.
+// What can go wrong when a simulated cell is set up: one line for a person that names what, where and
+// what to do.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
-// One run of the whole cell in one thread under virtual time: the controller that is deployed, on simulated
-// cables, against the simulated world. A pure function of the description: the same seed gives the same
-// bytes.
+// One run of the whole cell in one thread under virtual time: the controller that is deployed, on
+// simulated cables, against the simulated world. A pure function of the description: the same seed gives
+// the same bytes.
 //
 // Blocking     writes the run folder; otherwise only computes
 // Failure      one line; a run that does not complete is no failure of the simulation: its summary says what happened

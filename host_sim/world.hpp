@@ -1,5 +1,5 @@
-// The simulated cell: a plate on a table, an arm that carries a scanner, and the two device servers, in one
-// thread.
+// The simulated cell: a plate on a table, an arm that carries a scanner, and the two device servers,
+// in one thread.
 //
 //     auto plate = placed_plate(description);
 //     hal::Cable scanner_cable(clock, {}), robot_cable(clock, {.bytes_per_second = 11520});

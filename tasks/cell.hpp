@@ -1,5 +1,5 @@
-// The cell: supervisor (PackML), what happens inside Execute, and one shot after another. One row of the task
-// table.
+// The cell: supervisor (PackML), what happens inside Execute, and one shot after another. One row of
+// the task table.
 //
 // At most one event of each source is worked on in a tick; every transition is recorded. The machines themselves are
 // tables (cell_state.hpp, shot_sequence.hpp, boundary_tracker.hpp); this class carries their actions out.

@@ -193,8 +193,8 @@ void Cell::deliver() {
 }
 
 // A surface shot that the archive leaves out before later ones was given up when the run was recorded, and
-// its place was put at the end of the plan (give_up): so it is again, or every later number would stand for
-// another place.
+// its place was put at the end of the plan (give_up): so it is again, or every later number would stand
+// for another place.
 void Cell::skip_given_up() {
   while (archive_ != nullptr && wanted_ && wanted_->purpose == ShotPurpose::surface &&
          wanted_->number < archive_->last() && archive_->find(wanted_->number) == nullptr &&

@@ -1,5 +1,5 @@
-// The cell's supervisor: the states of ISA-TR88 (PackML), since that is what line controllers speak, as one
-// table.
+// The cell's supervisor: the states of ISA-TR88 (PackML), since that is what line controllers speak,
+// as one table.
 #pragma once
 
 #include "hal/realtime.hpp"

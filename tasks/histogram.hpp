@@ -1,6 +1,6 @@
 // A log-linear histogram of durations in constant memory: 64 buckets an octave, so a percentile is at most
-// 1.6 % above the true one. Values beyond 2^36 ns (68 s) go to an overflow bucket of their own, never into a
-// wrong one.
+// 1.6 % above the true one. Values beyond 2^36 ns (68 s) go to an overflow bucket of their own, never into
+// a wrong one.
 //
 // Thread       one writer; readers take a copy after the writer has stopped, or accept a count that is one behind
 // Allocation   none

@@ -1,6 +1,6 @@
 // Shots that have been taken before: a run that is resumed or fitted again gets them from here instead of
-// from the devices, in the order in which they were taken, and goes through the same states as if they had
-// just arrived.
+// from the devices, in the order in which they were taken, and goes through the same states as if they
+// had just arrived.
 //
 // Thread       the control thread; find() must not block or allocate (the shots are in memory before the run starts)
 #pragma once

@@ -1,5 +1,5 @@
-// One shot after another: drive there, expose, let the scanner compute while the arm goes on to the next
-// place.
+// One shot after another: drive there, expose, let the scanner compute while the arm goes on to
+// the next place.
 //
 // The machine knows two resources, the arm and the scanner. An order is a pose to shoot from; the next order may come
 // as soon as EXPOSED is seen (the arm is free then), the next exposure only when the frame before has arrived.

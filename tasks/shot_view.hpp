@@ -1,5 +1,5 @@
-// From a frame to what the cell makes of it: the plate's runs, the boundary's pieces, the points that lie on
-// the plate.
+// From a frame to what the cell makes of it: the plate's runs, the boundary's pieces, the points that lie
+// on the plate.
 //
 // Frame        scanner coordinates in, scanner coordinates out; the caller registers with the shot's pose
 // Cost         0.7 ms for 100 stripes of 500 points, in pieces of 10 us, or of 0.2 ms on a processor of 500 million
@@ -34,9 +34,9 @@ class ShotView {
     double reach_mm = 0;            // ... good to this
     bool boundary = true;           // false: only the points on the plate are wanted
   };
-  // Looks at a frame, which must stay as it is. `unpacks`, when given, holds points of it that are still packed or have
-  // still to arrive. In bounded pieces: begin(), then step() until it says true, then found() and the rest may be
-  // asked.
+  // Looks at a frame, which must stay as it is. `unpacks`, when given, holds points of it that are still packed or
+  // have still to arrive. In bounded pieces: begin(), then step() until it says true, then found() and the rest
+  // may be asked.
   void begin(const hal::Frame& frame, const Request&, hal::Scanner* unpacks = nullptr) MOLDLOFT_NONBLOCKING;
   bool step() MOLDLOFT_NONBLOCKING;
   bool waits() const MOLDLOFT_NONBLOCKING;  // step() can do nothing before more of the frame has arrived

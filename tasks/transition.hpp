@@ -1,6 +1,6 @@
 // State machines as tables: one row a transition, read by people, by the machine, by the test that proves
-// that every pair of state and event is either listed or explicitly ignored, and by the program that draws
-// the diagrams.
+// that every pair of state and event is either listed or explicitly ignored, and by the program that
+// draws the diagrams.
 //
 // A machine is a pure function of (state, event, context): no clock, no input or output. Rows are tried in order; the
 // first whose guard agrees is taken. Guards are free functions on values; the action is a value that the

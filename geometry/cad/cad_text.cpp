@@ -23,8 +23,8 @@ std::string real(double x, char exponent) {
 
 constexpr std::uint32_t replacement = 0xFFFD;
 
-// The next character of `text`, which is shortened by it. Overlong forms, surrogates and stray bytes are
-// replaced.
+// The next character of `text`, which is shortened by it. Overlong forms, surrogates and stray
+// bytes are replaced.
 std::uint32_t next_character(std::string_view& text) {
   const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
   const std::uint8_t first = byte(0);

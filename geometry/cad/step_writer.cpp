@@ -139,8 +139,8 @@ Ref bound(StepText& step, const FaceLoop& loop, Ref surface, Ref plane_of_parame
   return step.add(outer ? "FACE_OUTER_BOUND" : "FACE_BOUND", {"''", around.text(), ".T."});
 }
 
-// The product that the shape is of, as every system expects it; returns what the shape's representation
-// refers to.
+// The product that the shape is of, as every system expects it; returns what the shape's
+// representation refers to.
 Ref product(StepText& step, const CadLabel& label) {
   const Ref application = step.add("APPLICATION_CONTEXT", {"'managed model based 3d engineering'"});
   step.add(

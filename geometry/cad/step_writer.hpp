@@ -7,8 +7,8 @@
 //              face's normal is du x dv
 // Uncertainty  CadLabel::closure_mm, stated as distance_accuracy_value
 // Frame        that of the surface, world in the cell
-// Accuracy     poles, knots and paths read back bit-equal; space curves of trims within closure_mm of the
-//              surface
+// Accuracy     poles, knots and paths read back bit-equal; space curves of trims within closure_mm
+//              of the surface
 // Cost         about 60 bytes a control point
 // Allocation   yes
 // Failure      what check() of splines/trimmed_surface.hpp finds, impossible_setting: a closure_mm that is no length

@@ -166,8 +166,8 @@ void BoundaryViewer::take_stretch() {
   std::copy(ring_.begin() + from, ring_.begin() + to, std::back_inserter(points_));
 }
 
-// Some points of one pass over the stretch; true when the pass is done. Judged against the unchanged points, dropped
-// afterwards.
+// Some points of one pass over the stretch; true when the pass is done. Judged against the unchanged
+// points, dropped afterwards.
 bool BoundaryViewer::drop_false_points() {
   const auto piece = std::span<const EdgePoint>(points_).subspan(stretch_begin_);
   const std::size_t end = piece.size() + drop_lag;
@@ -229,9 +229,9 @@ std::size_t corner_within(std::span<const EdgePoint> part, std::size_t least,
   }
   const double rms = std::sqrt(squares / static_cast<double>(part.size()));
   if (rms <= settings.max_line_rms_mm && largest <= 4 * settings.max_line_rms_mm) return 0;
-  // Two lines may split a piece with two corners between them; the point farthest from the chord is then near
-  // one. Both searches may leave a side with two points: forced to more, they would borrow them from the
-  // other side.
+  // Two lines may split a piece with two corners between them; the point farthest from the chord is then
+  // near one. Both searches may leave a side with two points: forced to more, they would borrow them from
+  // the other side.
   for (const std::size_t split : {best_split(part, 2), split_at_farthest(part, tangent_stretch_mm, 2)}) {
     if (split < least || part.size() - split < least) continue;
     const EdgeLine a = fit_edge_line(last_stretch(part.first(split), tangent_stretch_mm, min_side));

@@ -10,8 +10,8 @@
 // Frame        as the edge points are given: scanner coordinates, plan view decides
 // Cost         O(edge points), plus a split search of O(n log n) for corners
 // Allocation   in the constructor only
-// Failure      none: runs whose ends are no finite numbers are left out, and where nothing is seen the view
-//              is empty
+// Failure      none: runs whose ends are no finite numbers are left out, and where nothing is seen the
+//              view is empty
 #pragma once
 
 #include "geometry/edges/plate_runs.hpp"
@@ -63,16 +63,16 @@ class BoundaryViewer {
     std::span<const EdgePoint> points;
     std::span<const BoundaryPiece> pieces;  // longest first; empty when no edge is in the field
     bool plate_fills_field = false;  // no edge at all, and every stripe lies on the plate from end to end
-    // Where the region ends inside the field with a long stripe, the boundary runs unseen between this x and
-    // the next stripe: the plate ends within half a pitch of the value, seen even where no stripe shows an
-    // edge point.
+    // Where the region ends inside the field with a long stripe, the boundary runs unseen between this x
+    // and the next stripe: the plate ends within half a pitch of the value, seen even where no stripe shows
+    // an edge point.
     std::optional<double> hidden_low_x_mm, hidden_high_x_mm;
   };
   View look(std::span<const PlateRun> runs, std::size_t stripe_count,
             const BoundaryViewSettings&) MOLDLOFT_GEOMETRY_NONBLOCKING;  // valid until the next call
 
-  // The same in bounded pieces: begin(), step() until it says true, view(). A step goes over one piece of the
-  // boundary once.
+  // The same in bounded pieces: begin(), step() until it says true, view(). A step goes over one piece of
+  // the boundary once.
   void begin(std::span<const PlateRun> runs, std::size_t stripe_count,
              const BoundaryViewSettings&) MOLDLOFT_GEOMETRY_NONBLOCKING;
   bool step() MOLDLOFT_GEOMETRY_NONBLOCKING;

@@ -90,8 +90,8 @@ EdgeLine fit_edge_line(std::span<const EdgePoint> points) {
       squares += clipped * clipped;
     }
     line.rms_mm = std::sqrt(squares / static_cast<double>(points.size()));
-    // The mean deviation gives a standard deviation that single points pull at only linearly; it falls with
-    // each pass.
+    // The mean deviation gives a standard deviation that single points pull at only linearly; it falls
+    // with each pass.
     scale = std::max(std::min(scale, 1.25 * absolute / static_cast<double>(points.size())), 1e-3);
     scale = std::max(std::min(scale, 1.2 * line.rms_mm), 1e-3);
   }

@@ -1,5 +1,5 @@
-// Lines through edge points in plan view: robust fits, false points, and the split of a bent stretch into two
-// lines.
+// Lines through edge points in plan view: robust fits, false points, and the split of a bent stretch
+// into two lines.
 //
 // Units        mm, plan view (x, y) of the edge points
 // Cost         fit_edge_line O(n) a pass, five passes; best_split O(n); is_false_point constant
@@ -24,12 +24,12 @@ struct EdgeLine {
   }
 };
 
-// Orthogonal regression, reweighted with Huber's function so that a few false points do not tilt it. At least
-// 2 points.
+// Orthogonal regression, reweighted with Huber's function so that a few false points do not tilt it. At
+// least 2 points.
 EdgeLine fit_edge_line(std::span<const EdgePoint> points);
 
-// Where two lines meet. Lines within 0.03 rad of parallel give nothing, nor do lines that are no finite
-// numbers.
+// Where two lines meet. Lines within 0.03 rad of parallel give nothing, nor do lines that are
+// no finite numbers.
 std::optional<Eigen::Vector2d> meeting_point(const EdgeLine&, const EdgeLine&);
 
 // True when the point at `index` lies on neither the line of its five predecessors nor that of its five

@@ -29,8 +29,8 @@ constexpr std::size_t points_in_turn = 192;
 constexpr std::uint32_t farthest_link =
     3;  // stripes ahead: two may be missing between two runs of one region
 
-// The usual distance between neighbouring points near one end of a run, where perspective may have stretched
-// it.
+// The usual distance between neighbouring points near one end of a run, where perspective may
+// have stretched it.
 double spacing_near_end(const StripeView& stripe, std::span<const std::uint32_t> good, bool at_last) {
   std::array<double, 21> sample;
   std::size_t count = 0;
@@ -280,8 +280,8 @@ bool at_field_limit(double y_outward, std::size_t rays_beyond, double spacing,
 RunEnd kind_of_end(const Neighbour& beyond, const PlateRunSettings& settings) {
   if (!beyond.exists) return RunEnd::free_end;
   if (beyond.gap_mm <= settings.bridge_mm) return beyond.rise_mm > 0 ? RunEnd::hidden : RunEnd::step_down;
-  // Behind a gap: something that towers over the plate throws a shadow on it; anything else leaves the edge
-  // free.
+  // Behind a gap: something that towers over the plate throws a shadow on it; anything else leaves
+  // the edge free.
   const bool towers = beyond.rise_mm > settings.min_step_mm && beyond.gap_mm <= 3 * settings.bridge_mm;
   return towers ? RunEnd::hidden : RunEnd::free_end;
 }

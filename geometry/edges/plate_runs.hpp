@@ -6,8 +6,8 @@
 // bridged, an outlier skipped. At a jump the plate is the nearer (higher) side: a jump upwards is something
 // that lies on the plate or hides it, not the plate's edge.
 //
-// Frame        scanner coordinates (mm): stripes run along +y, follow one another along +x, z towards the
-//              scanner
+// Frame        scanner coordinates (mm): stripes run along +y, follow one another along +x, z
+//              towards the scanner
 // Accuracy     an edge lies half a point spacing beyond the run's last good point, so without bias; standard
 //              deviation 0.29 spacings along the stripe
 // Cost         O(points); 50,000 points in 100 stripes take about 0.4 ms (moldloft-bench edges)

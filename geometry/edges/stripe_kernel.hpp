@@ -2,8 +2,8 @@
 // as long as every one of them simply goes on or misses a point. A point waits for the result of the one before it (a
 // division and a dozen dependent operations); eight stripes wait together.
 //
-// Source       StripeWalk::step() for a filter whose memory is full: the same operations in the same order, so the
-//              same bits
+// Source       StripeWalk::step() for a filter whose memory is full: the same operations in the same order, so
+//              the same bits
 // Units        mm
 // Cost         2 ns a point where nothing stops the eight
 // Allocation   none

@@ -77,8 +77,8 @@ class StripeWalk {
   static constexpr int slope_known_after = 6;    // points
   static constexpr std::size_t outliers_in_a_row = 2;
 
-  // The stripe's usual distance between neighbouring points, from a sample of them; missing points do not
-  // count.
+  // The stripe's usual distance between neighbouring points, from a sample of them; missing points
+  // do not count.
   static double usual_spacing(const StripeView& stripe) {
     std::array<double, 31> sample;
     std::size_t count = 0;

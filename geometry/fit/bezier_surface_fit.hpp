@@ -1,10 +1,10 @@
 // One Bezier patch of any degree through Bezier stripes with straight pre-images (thesis section 3.2, eq.
 // 3.1-3.14), with or without its boundary given (eq. 3.40).
 //
-// The thesis's first method, kept as what it is: every control point reaches everywhere, and the condition of
-// the matrix grows about tenfold with every second degree. Up to degree 10 or so it serves; at degree 24 the
-// normal equations are no longer positive definite and even QR loses ten digits. For work:
-// bspline_surface_fit.hpp.
+// The thesis's first method, kept as what it is: every control point reaches everywhere, and the
+// condition of the matrix grows about tenfold with every second degree. Up to degree 10 or so it
+// serves; at degree 24 the normal equations are no longer positive definite and even QR loses ten
+// digits. For work: bspline_surface_fit.hpp.
 //
 // Shapes       control point (i, j) of the net in row i (degree_v + 1) + j, columns x, y, z
 // Units        mm in, mm out; the pre-images lie in [0, 1]^2
@@ -49,8 +49,8 @@ struct BezierSurfaceFit {
   double rms_mm = 0, max_mm = 0;  // of the equations
 };
 
-// Fills [a] of equation (3.14): degree_u + degree_v + 1 rows a stripe. Allocates only when `matrix` has
-// another size.
+// Fills [a] of equation (3.14): degree_u + degree_v + 1 rows a stripe. Allocates only when `matrix`
+// has another size.
 void matching_matrix(int degree_u, int degree_v, std::span<const BezierStripe>, Eigen::MatrixXd& matrix);
 
 std::expected<BezierSurfaceFit, MatchingFailure> fit_bezier_surface(std::span<const BezierStripe>,

@@ -239,8 +239,8 @@ MatchingResidual BSplineSurfaceFit::residual(std::span<const SpaceCurve> stripes
   };
   for (const Piece& piece : pieces_) {
     const CubicControl control = piece_control(piece.along_t, stripes[piece.stripe], piece.first_t);
-    // Between Bernstein coefficients the difference stays within their hull: its largest bounds it
-    // everywhere.
+    // Between Bernstein coefficients the difference stays within their hull: its largest
+    // bounds it everywhere.
     const SexticSide miss = bicubic_rows(piece.along_u, piece.along_v).transpose() *
                                 cell_of(surface, piece.first_u, piece.first_v) / piece.root_weight -
                             sextic_side(control);

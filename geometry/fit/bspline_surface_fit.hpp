@@ -9,8 +9,8 @@
 // Accuracy     the control points are the least squares solution within 4 half_band eps condition() of their
 //              size (Higham, Accuracy and Stability, theorem 10.4): a surface of these knots comes back from
 //              its own stripes
-// Cost         0.4 us a piece to assemble, 0.2 us to solve for, and the band factorization
-//              (matching_system.hpp)
+// Cost         0.4 us a piece to assemble, 0.2 us to solve for, and the
+//              band factorization (matching_system.hpp)
 // Allocation   0.3 kB a piece and the band; solve() a right side and the surface
 // Failure      MatchingFailure, which names the stripe or the control point
 #pragma once
@@ -66,9 +66,9 @@ class BSplineSurfaceFit {
       std::vector<double> knots_u, std::vector<double> knots_v, std::span<const StripeTrack> stripes,
       std::span<const SampledTrack> samples = {}, const MatchingSettings& = {});
 
-  // The curve of every stripe and the points of every sampled track, in the order of assemble(). The outer
-  // ring of `base` (the Coons net of the boundary curves) is kept when the ring is given; else base is not
-  // looked at.
+  // The curve of every stripe and the points of every sampled track, in the order of assemble(). The
+  // outer ring of `base` (the Coons net of the boundary curves) is kept when the ring is given; else base
+  // is not looked at.
   std::expected<BSplineSurface, MatchingFailure> solve(std::span<const SpaceCurve> stripes,
                                                        std::span<const SampledPoints> samples,
                                                        const BSplineSurface& base) const;

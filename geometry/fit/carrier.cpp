@@ -63,8 +63,8 @@ struct Extent {
   double size() const { return high - low; }
 };
 
-// The curve's extent along `direction`: at the ends of its pieces and where their derivative, a parabola, is
-// zero.
+// The curve's extent along `direction`: at the ends of its pieces and where their derivative, a
+// parabola, is zero.
 void take_curve(const PlanCurve& curve, const Vector2d& direction, Extent& extent) {
   for (const Piece& piece : pieces_of(curve)) {
     extent.take(direction.dot(piece.start.value));

@@ -1,6 +1,6 @@
-// A four-sided carrier for outlines that are not four-sided: the rectangle of least area round the outline,
-// as an Outline for PlanMap, and the outline itself in the (u, v) of that rectangle, to trim the fitted
-// surface with.
+// A four-sided carrier for outlines that are not four-sided: the rectangle of least area round the
+// outline, as an Outline for PlanMap, and the outline itself in the (u, v) of that rectangle, to trim the
+// fitted surface with.
 //
 // The rectangle has straight sides at constant speed, so the plan map is affine, and the outline's control
 // points are mapped exactly. It is no larger than the outline's own extent, but for 1e-9 of it (and
@@ -9,8 +9,8 @@
 // of the rectangle is left. A scan also sees what lies beside the plate, and the map takes all of the
 // rectangle: the caller gives the fit only points that are inside().
 //
-// Source       least rectangle: one of its sides lies along an edge of the convex hull (Freeman and Shapira
-//              1975)
+// Source       least rectangle: one of its sides lies along an edge of the convex hull (Freeman
+//              and Shapira 1975)
 // Frame        world, plan view, mm; outlines in either direction (turned counter-clockwise)
 // Accuracy     extents exact to rounding (roots of the pieces' derivatives); the rectangle's direction is the
 //              best for the outline cut into chords, whose area is within 1e-3 of the least one for smooth

@@ -3,8 +3,8 @@
 // coarser net follow from them exactly. A row of the 7 x 7 carries an
 // eighth sum, w z^2 B6_p, so that the squares of the heights are known cell by cell too.
 //
-// Cost         add: 56 + 16 multiply-adds (the plain form; moment_kernel.hpp has the fast one); merge:
-//              moment_kernel.hpp
+// Cost         add: 56 + 16 multiply-adds (the plain form; moment_kernel.hpp has the fast
+//              one); merge: moment_kernel.hpp
 // Allocation   in the constructor only
 #pragma once
 

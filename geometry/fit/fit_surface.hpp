@@ -1,30 +1,30 @@
 // One call from points to a surface: z(u, v) as a bicubic B-spline, least squares on a given net or on one
-// chosen from a tolerance, with fairing where data are missing, robust against outliers, the boundary given
-// or free.
+// chosen from a tolerance, with fairing where data are missing, robust against outliers, the boundary
+// given or free.
 //
 //     auto fitted = fit_surface({.u = x, .v = y, .z = z}, {.domain = {0, 305, 0, 305}, .tolerance = 0.005});
 //
 // Points are folded into moments (moment_accumulator.hpp), so a serial and a parallel or streamed use
 // differ only in who adds: fill accumulators wherever the points are, merge them, and call fit_moments().
 //
-// Model        the unique minimum of sum w (z - f(u, v))^2 + fairing; x and y of the surface are u and v
-//              themselves
-// Net          control_u x control_v over equal spans; or knots_u, knots_v; or, with control_u == 0, chosen
-//              by cross-validation from one pass over the points: nested nets of finest_spans x
-//              finest_spans down to 4 x 4, then nets between the best of them and its neighbours, whose
-//              knots are some of the finest net's (where the points are at hand, one more pass spaces them
-//              evenly)
-// Accuracy     coefficients within 1e-11 of the heights' range of a dense QR solution; rms error against
-//              the truth sigma sqrt(N / M) for N control points and M points, where the net can follow the
-//              truth
+// Model        the unique minimum of sum w (z - f(u, v))^2 + fairing; x and y of the surface are u
+//              and v themselves
+// Net          control_u x control_v over equal spans; or knots_u, knots_v; or, with control_u == 0,
+//              chosen by cross-validation from one pass over the points: nested nets of finest_spans x
+//              finest_spans down to 4 x 4, then nets between the best of them and its neighbours,
+//              whose knots are some of the finest net's (where the points are at hand, one more pass
+//              spaces them evenly)
+// Accuracy     coefficients within 1e-11 of the heights' range of a dense QR solution; rms error
+//              against the truth sigma sqrt(N / M) for N control points and M points, where the net can
+//              follow the truth
 // Cost         450,000 points on 23 x 23: 3 ms (AVX-512); the choice among five nets 10 ms
 // Memory       independent of the number of points: <= 1 MiB on 23 x 23, 10 MiB on 64 x 64
 // Points       any order; a net is chosen only among those with at least 4 points for every control point, so a
 //              choice wants 196 of them (a given net 1 each, and with fairing any three that are on no line)
-// Failure      FitFailure names the error and the point, cell, coefficient or knot that it is about: not_finite,
-//              too_large, negative_weight, outside_domain, sizes_differ, too_few_points, collinear (in plan
-//              view), no_extent (of the domain), empty_cells, singular, impossible_setting, capacity, those of
-//              knots.hpp
+// Failure      FitFailure names the error and the point, cell, coefficient or knot that it is about:
+//              not_finite, too_large, negative_weight, outside_domain, sizes_differ, too_few_points, collinear
+//              (in plan view), no_extent (of the domain), empty_cells, singular, impossible_setting, capacity,
+//              those of knots.hpp
 #pragma once
 
 #include "geometry/fit/moment_accumulator.hpp"

@@ -1,12 +1,12 @@
-// A stripe whose pre-image is a curve: points of it at Gauss nodes, weighted by length in (u, v), to be given
-// to BSplineSurfaceFit as a sampled track. Coefficients cannot be matched there (the composition's degree
-// would be 18), but the least squares sum over the nodes is the integral of the squared distance along the
-// pre-image.
+// A stripe whose pre-image is a curve: points of it at Gauss nodes, weighted by length in (u, v), to be
+// given to BSplineSurfaceFit as a sampled track. Coefficients cannot be matched there (the composition's
+// degree would be 18), but the least squares sum over the nodes is the integral of the squared distance
+// along the pre-image.
 //
 // Source       Golub and Welsch 1969 for what the nodes are; here by Newton steps on the Legendre recurrence
 // Accuracy     nodes and weights within 8 eps; the integral is exact where the integrand is of degree 2 nodes
-//              - 1 between the knots of stripe and pre-image, and asymptotically so across the surface's
-//              knots
+//              - 1 between the knots of stripe and pre-image, and asymptotically so across
+//              the surface's knots
 // Cost         a curve point a node
 // Allocation   what is returned
 // Failure      none here; a pre-image that leaves the domain is refused by assemble()

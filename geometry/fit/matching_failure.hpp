@@ -1,5 +1,5 @@
-// What is wrong with stripes that should make a surface, and where: for a person to read, for a program to
-// act on.
+// What is wrong with stripes that should make a surface, and where: for a person to read, for a program
+// to act on.
 #pragma once
 
 #include "geometry/error.hpp"

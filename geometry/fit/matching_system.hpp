@@ -31,8 +31,8 @@ class MatchingSystem {
 
   MatchingSystem(int control_u, int control_v, Ring);
 
-  // Adds the Gram matrix of a cell's rows; (first_u, first_v) is the first of the cell's 4 x 4 control
-  // points.
+  // Adds the Gram matrix of a cell's rows; (first_u, first_v) is the first of the cell's 4 x
+  // 4 control points.
   using Gram = Eigen::Matrix<double, 16, 16>;  // the blocks on and below the diagonal count, whole
   void add(int first_u, int first_v, const Gram&);
 
@@ -43,9 +43,9 @@ class MatchingSystem {
   void add_side(int first_u, int first_v, const Side&, Eigen::MatrixX3d& side) const;
   void solve(Eigen::MatrixX3d& side) const;  // in place; factor() has succeeded
 
-  // Of the factored matrix in the 2-norm: the square of the equations'. Its largest eigenvalue by the largest
-  // row sum, its smallest by inverse iteration: between a half and eight times the truth. Costs some ten
-  // solutions.
+  // Of the factored matrix in the 2-norm: the square of the equations'. Its largest eigenvalue by the
+  // largest row sum, its smallest by inverse iteration: between a half and eight times the truth. Costs
+  // some ten solutions.
   double condition() const;
   int half_band() const { return band_.half_band(); }
 

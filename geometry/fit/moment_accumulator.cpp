@@ -133,8 +133,8 @@ std::expected<void, FitFailure> MomentAccumulator::read(const PointColumns& colu
   if (lookup_ == nullptr) {
     const UniformCells cells = uniform_cells(grid_, domain_);
     if (!kernel_->locate(block, u, v, cells)) {
-      // Rounding may carry a point of the domain's end beyond the last cell's; then there is nothing to
-      // refuse.
+      // Rounding may carry a point of the domain's end beyond the last cell's; then there is
+      // nothing to refuse.
       check();
       if (block.count > 0) {
         for (int k = 0; k < block.count; ++k) {

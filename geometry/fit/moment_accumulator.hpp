@@ -29,8 +29,8 @@
 
 namespace moldloft::geometry {
 
-// What is wrong with data, and where: the number of the point, knot, cell or coefficient that the error
-// speaks of.
+// What is wrong with data, and where: the number of the point, knot, cell or coefficient that the
+// error speaks of.
 struct FitFailure {
   Error error{};
   std::size_t where = 0;

@@ -1,5 +1,5 @@
-// The inner loops of the surface fit: a block of points to Bernstein values, values to moments, halves to
-// wholes.
+// The inner loops of the surface fit: a block of points to Bernstein values, values to moments,
+// halves to wholes.
 //
 // Stage 1 (lanes over points): cell, local coordinates, cubic and sextic Bernstein values of every point of
 // a block. Stage 2 (lanes over entries): over each run of consecutive points in one cell, with the cell's 7
@@ -7,8 +7,8 @@
 //
 // Accuracy     every entry is a plain sum in the order of the points, so that the bits do not depend on the
 //              variant, nor on how a stream of points is cut into blocks
-// Cost         3-6 ns a point with AVX-512 or AVX2 while stripes stay in their cells; a run costs some 10
-//              ns more
+// Cost         3-6 ns a point with AVX-512 or AVX2 while stripes stay in their cells; a run costs some
+//              10 ns more
 // Allocation   none
 #pragma once
 
@@ -49,8 +49,8 @@ struct UniformCells {
 struct MomentKernel {
   Simd simd;
   // Fills s, t and cell from `count` coordinates; height (and weight, if weighted) must be there. False
-  // when a point lies outside the grid or is not finite: those are put at a cell's corner, so that memory
-  // stays safe.
+  // when a point lies outside the grid or is not finite: those are put at a cell's corner, so that
+  // memory stays safe.
   bool (*locate)(PointBlock&, const double* u, const double* v, const UniformCells&);
   void (*values)(PointBlock&);
   // Adds all points of the block; `counts` (one a cell) may be null.
@@ -60,8 +60,8 @@ struct MomentKernel {
   // The surface at every point, from its cell's 4 x 4 Bezier coefficients; the block is not weighted, its
   // shot rows wanted.
   void (*heights)(const PointBlock&, const std::array<double, 16>* bezier, double* out);
-  // One cell from its halves, [u half][v half]; a direction that is not halved passes null for its second
-  // halves.
+  // One cell from its halves, [u half][v half]; a direction that is not halved passes null for
+  // its second halves.
   void (*merge)(const CellMoments* const halves[4], CellMoments& whole);
   // The Gram matrix of the 16 functions that live on a cell, as SplineNet lays it out (CellMatrix): moments
   // in rows of eight, the slow direction's products of two functions, those of the fast direction turned.

@@ -184,8 +184,8 @@ void NetSolver::take_offsets() {
   result_.freedom += n;
 }
 
-// The minimum of the objective holds the energy of fairing and border; the residual is what is left without
-// them.
+// The minimum of the objective holds the energy of fairing and border; the residual is what is
+// left without them.
 void NetSolver::finish() {
   if (!task_.boundary.empty() && std::isfinite(task_.boundary_weight)) {
     for (int k = 0; k < size(); ++k) {

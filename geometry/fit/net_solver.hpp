@@ -1,8 +1,8 @@
 // Solves one net: moments to normal equations, fairing, boundary, factor, shot offsets, coefficients,
 // residual. In bounded pieces.
 //
-// Objective    sum w (z - f)^2 + fairing, the thin-plate energy with a weight relative to the data (ratio
-//              of traces)
+// Objective    sum w (z - f)^2 + fairing, the thin-plate energy with a weight relative to the data
+//              (ratio of traces)
 // Boundary     the outer ring of coefficients, if given: moved to the right side (thesis eq. 3.40, 3.41),
 //              or pulled at with a weight
 // Cost         unknowns * half_band^2 / 2 in all. A step takes at most `work_a_step` multiply-adds, or, if that is

@@ -85,8 +85,8 @@ Foot settle(const BSplineSurface& surface, const Vector3d& point, const Vector2d
   for (int step = 0; step < foot_steps; ++step) {
     const Vector2d full = newton_step(at, foot);
     if (!full.allFinite()) break;
-    // Near the foot the distance is flat and its fall drowns in rounding: there the slant tells whether to go
-    // on.
+    // Near the foot the distance is flat and its fall drowns in rounding: there the slant tells whether
+    // to go on.
     const bool near = slant(foot) <= flat_share * foot.squared;
     bool better = false;
     double share = 1;
@@ -103,8 +103,8 @@ Foot settle(const BSplineSurface& surface, const Vector3d& point, const Vector2d
   return foot;
 }
 
-// What of a residual the parameters cannot take away: the projection off the tangent directions that are
-// free.
+// What of a residual the parameters cannot take away: the projection off the tangent directions
+// that are free.
 Matrix3d stands_off(const Foot& foot) {
   Matrix3d weight = Matrix3d::Identity();
   if (foot.free_u && foot.free_v) {

@@ -10,9 +10,9 @@
 //              its foot by Newton steps that never lengthen its distance. Point-distance steps (PDM: refit
 //              at the corrected parameters) are there for comparison: they crawl.
 // Trust        the step is damped by lambda sum |surface's movement at the points|^2 (Levenberg-Marquardt in
-//              the metric of the data). It is kept only if the sum of squared distances falls; if not, lambda
-//              grows and the step is taken again. So no round, and no result, is worse than the fit at the
-//              given parameters.
+//              the metric of the data). It is kept only if the sum of squared distances falls; if not,
+//              lambda grows and the step is taken again. So no round, and no result, is worse than the fit
+//              at the given parameters.
 // Units        mm; parameters in the knots' domain, [0, 1]^2 as a rule
 // Accuracy     points of a surface over the same knots, from parameters off by a tenth of a span: back to
 //              1e-9 of their extent where the border is kept, to 1e-6 in a hundred rounds where it is free
@@ -20,9 +20,9 @@
 //              1e-15 to 1e-6, see README.md of this folder. Far off, as with the strong wave under oblique
 //              stripes, it ends in a better fit of the points that need not be the part: the report tells by
 //              its rms. Parameters are feet: residual orthogonal to 1e-9 of the tangent
-// Cost         a round: a point about 1.5 us, the solution 3 half_band^2 a control point with half_band = 3
-//              (3 n + 4), n the shorter side of the net. 1,296 points on 11 x 11: 2.5 ms a round; 10 to 40
-//              rounds
+// Cost         a round: a point about 1.5 us, the solution 3 half_band^2 a control point with half_band
+//              = 3 (3 n + 4), n the shorter side of the net. 1,296 points on 11 x 11: 2.5 ms a round; 10
+//              to 40 rounds
 // Allocation   the equations at the start, a copy of net and feet a round; not for the control thread
 // Failure      Error::too_few_points (fewer than free control points, or points without parameters),
 //              not_finite, outside_domain (a parameter off the knots), collinear (parameters that span no
@@ -55,8 +55,8 @@ struct CorrectionSettings {
   // alone leave the net open (a pivot below 1e-10 of the largest), and so small that it decides nothing else.
   // A hole wide against the spans wants 1e-7.
   double fairing = 1e-12;
-  // The outer ring of control points stays that of the surface given: known boundary curves (thesis eq.
-  // 3.40).
+  // The outer ring of control points stays that of the surface given: known boundary curves
+  // (thesis eq. 3.40).
   bool keep_border = false;
 };
 

@@ -32,8 +32,8 @@ Eigen::Vector2d control(const PlanCurve& side, bool reversed, int i) {
   return reversed ? side.control[side.control.size() - 1 - i] : side.control[i];
 }
 
-// The piece of a uniform clamped spline on span k in powers of the span's coordinate, by its Taylor
-// coefficients.
+// The piece of a uniform clamped spline on span k in powers of the span's coordinate, by
+// its Taylor coefficients.
 std::array<double, 4> powers_on_span(std::span<const double> knots, int k, const std::array<double, 4>& c) {
   const double t = knots[k], h = knots[k + 1] - knots[k];
   const BasisValues at_start = cubic_basis(knots, k, t), at_end = cubic_basis(knots, k, knots[k + 1]);

@@ -10,9 +10,9 @@
 // Cost         a point with a neighbour's (u, v) as guess: 2-3 Newton steps, about 0.1 us; in batches of
 //              neighbours 10-20 ns a point
 // Allocation   none in invert(); the constructor copies four curves
-// Failure      from check() Error::folded_map, collinear (a corner whose sides do not turn) or not_finite;
-//              outside_domain from invert() when the point lies off the plate by more than the margin asked
-//              for
+// Failure      from check() Error::folded_map, collinear (a corner whose sides do not turn) or
+//              not_finite; outside_domain from invert() when the point lies off the plate by more than
+//              the margin asked for
 // Expects      sides that share one uniform clamped knot vector, as OutlineBuilder makes them
 #pragma once
 

@@ -7,9 +7,9 @@
 // for z = 1), D the number of points and h the sum of heights of every shot. The surface follows from L' c
 // = y - W d.
 //
-// Columns      y and W side by side, row by row, in groups of eight columns; sorted by the first unknown
-//              that a shot touches, above which a column is zero, so that a group starts where its first
-//              shot does
+// Columns      y and W side by side, row by row, in groups of eight columns; sorted by the first
+//              unknown that a shot touches, above which a column is zero, so that a group starts where
+//              its first shot does
 // Memory       a shot's moments are kept only for the cells that it touches; when the plan is full, the
 //              shot at hand and those after it are taken as exact and counted
 // Allocation   in the constructor only
@@ -39,9 +39,9 @@ class ShotOffsets {
 
   std::size_t cells_of(int slot) const { return slots_[slot].end - slots_[slot].begin; }
 
-  // From one net to the next coarser one: the cells of every slot merge, piece by piece in order (`first`
-  // and `end` count the slot's cells, cells_of() before the first piece), then coarsened() says to which
-  // net's.
+  // From one net to the next coarser one: the cells of every slot merge, piece by piece in order
+  // (`first` and `end` count the slot's cells, cells_of() before the first piece), then coarsened() says
+  // to which net's.
   void coarsen(int slot, const MomentGrid& to, std::size_t first, std::size_t end);
   void coarsened(const MomentGrid& to) { level_u_ = to.cells_u(), level_v_ = to.cells_v(); }
 

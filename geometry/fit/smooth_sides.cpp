@@ -101,8 +101,8 @@ Points closed_slopes(const Points& p) {
   return x;
 }
 
-// The C2 spline with these values and slopes over simple knots: a control point is the blossom of a piece
-// near it.
+// The C2 spline with these values and slopes over simple knots: a control point is the blossom of a
+// piece near it.
 PlanCurve spline_through(const Points& p, const Points& slope) {
   const Chords c = chords_of(p);
   std::vector<double> parameter{0};

@@ -4,8 +4,8 @@
 // wherever the surface climbs.
 //
 // Units        points in mm; (u, v) and t are parameters
-// Accuracy     the least squares curve of curve_fit.hpp; consistent t within 4 eps over the pre-image's
-//              length
+// Accuracy     the least squares curve of curve_fit.hpp; consistent t within 4 eps over
+//              the pre-image's length
 // Cost         the curve fit's
 // Allocation   what is returned
 // Failure      CurveFitError: sizes_differ, no_length (the pre-image), what fit_curve() finds (repeated_points:
@@ -38,8 +38,8 @@ struct StripeCurve {
   double rms_mm = 0, max_mm = 0;  // the points about the curve
 };
 
-// `uv` has an entry a point; the pre-image is straight from the first to the last. `knots` are clamped on [0,
-// 1].
+// `uv` has an entry a point; the pre-image is straight from the first to the last. `knots` are clamped
+// on [0, 1].
 std::expected<StripeCurve, CurveFitError> fit_stripe(std::span<const Eigen::Vector3d> points,
                                                      std::span<const Eigen::Vector2d> uv,
                                                      std::span<const double> knots, StripeParameter);

@@ -2,11 +2,11 @@
 // `from` to `to` of the unit square, one for each Bernstein coefficient in t (thesis eq. 3.5-3.13).
 //
 // Method       each basis in u and v is restricted to the pre-image's interval (eq. 3.6), the two are
-//              multiplied with their binomials (eq. 3.7): the thesis's six nested loops without computing
-//              anything twice
+//              multiplied with their binomials (eq. 3.7): the thesis's six nested loops without
+//              computing anything twice
 // Shapes       rows: degree_u + degree_v + 1; columns: control point (i, j) at i (degree_v + 1) + j
-// Accuracy     entries are sums of nonnegative terms: within 4 (degree_u + degree_v) eps of themselves inside
-//              [0, 1]
+// Accuracy     entries are sums of nonnegative terms: within 4 (degree_u + degree_v) eps of themselves
+//              inside [0, 1]
 // Cost         (degree_u + 1)^2 (degree_v + 1)^2 multiply-adds a stripe
 // Allocation   the matrices that are returned, and the two restrictions; none in the bicubic form
 #pragma once
@@ -19,13 +19,13 @@ namespace moldloft::geometry {
 void fill_matching_rows(int degree_u, int degree_v, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
                         Eigen::Ref<Eigen::MatrixXd> rows);
 
-// The right side g of the stripe, its degree raised to degree_u + degree_v (eq. 3.9, 3.12): a row a
-// coefficient.
+// The right side g of the stripe, its degree raised to degree_u + degree_v (eq. 3.9, 3.12): a
+// row a coefficient.
 Eigen::MatrixX3d matching_side(const Eigen::MatrixX3d& stripe_control, int raised_degree);
 
-// The same for a piece of a bicubic B-spline's cell, transposed: column p is equation p, basis function (i,
-// j) of the cell at 4 i + j. `along_u` and `along_v` are the bases on the piece in Bernstein form
-// (span_restriction).
+// The same for a piece of a bicubic B-spline's cell, transposed: column p is equation p, basis
+// function (i, j) of the cell at 4 i + j. `along_u` and `along_v` are the bases on the piece in
+// Bernstein form (span_restriction).
 using BicubicRows = Eigen::Matrix<double, 16, 7>;
 BicubicRows bicubic_rows(const Eigen::Matrix4d& along_u, const Eigen::Matrix4d& along_v);
 

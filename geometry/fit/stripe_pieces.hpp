@@ -1,6 +1,6 @@
-// A stripe's pre-image on a B-spline surface, and its cuts: at the stripe's own knots and where the pre-image
-// crosses the surface's knot lines, so that on every piece both stripe and surface are polynomials (thesis
-// section 3.3).
+// A stripe's pre-image on a B-spline surface, and its cuts: at the stripe's own knots and where the
+// pre-image crosses the surface's knot lines, so that on every piece both stripe and surface are polynomials
+// (thesis section 3.3).
 //
 // Units        (u, v) and t are parameters; nothing here is a length in mm
 // Accuracy     cuts within 4 eps of the parameters' size; two cuts nearer than 1e-12 in t are one
@@ -36,8 +36,8 @@ struct TrackPiece {
   double length() const { return (uv1 - uv0).norm(); }
 };
 
-// Whether the pre-image has length everywhere and stays in [knots_u domain] x [knots_v domain]; the knots are
-// valid.
+// Whether the pre-image has length everywhere and stays in [knots_u domain] x [knots_v domain]; the
+// knots are valid.
 std::expected<void, Error> check_preimage(const Preimage&, std::span<const double> stripe_knots,
                                           std::span<const double> knots_u, std::span<const double> knots_v);
 

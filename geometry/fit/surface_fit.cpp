@@ -38,8 +38,8 @@ struct Level {
   BSplineSurface surface;
 };
 
-// The finest net and its halvings, in both directions as long as both can be halved, then in the one that
-// can.
+// The finest net and its halvings, in both directions as long as both can be halved, then in the
+// one that can.
 std::vector<std::pair<int, int>> nested_nets(int spans_u, int spans_v) {
   std::vector<std::pair<int, int>> nets{{spans_u, spans_v}};
   while (nets.back() != std::pair(fewest_spans, fewest_spans)) {
@@ -269,9 +269,9 @@ bool SurfaceFit::Work::merge_some() {
 void SurfaceFit::Work::keep_if_best() {
   const NetResult& result = solver.result();
   point_sigma = result.point_sigma_mm;  // all nets are compared under the finest net's estimate
-  // Scores are mean squared errors of prediction, so their difference is the square of what the coarser net
-  // misses. Nets come from fine to coarse: each one within the tolerance of the best so far takes over from
-  // it.
+  // Scores are mean squared errors of prediction, so their difference is the square of what the coarser
+  // net misses. Nets come from fine to coarse: each one within the tolerance of the best so far takes
+  // over from it.
   const double score = generalized_cross_validation(totals, result);
   if (!(score < best_score + settings.tolerance_mm * settings.tolerance_mm)) return;
   best_score = std::min(best_score, score), best = level;

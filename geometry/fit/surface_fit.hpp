@@ -2,14 +2,14 @@
 // by 2^l spans come out of the same pass; generalized cross-validation picks one.
 //
 // Model        z(u, v) = sum N_i(u) M_j(v) z_ij + d_s, with d_s the unknown height error of shot s (robot
-//              repeatability), a zero-mean random effect with standard deviation shot_sigma_mm: overlapping
-//              shots and neighbours estimate it together with the surface. (u, v) are plan-view parameters
-//              (plan_map.hpp)
+//              repeatability), a zero-mean random effect with standard deviation shot_sigma_mm:
+//              overlapping shots and neighbours estimate it together with the surface. (u, v) are
+//              plan-view parameters (plan_map.hpp)
 // Moments      per cell 7 x 7 of B6 B6 and 4 x 4 of z B3 B3 (cell_moments.hpp), per shot 4 x 4 of B3 B3
 // Fairing      a thin-plate term, tiny relative to the data, so that cells without points stay defined
 // Frame        world, mm
-// Work         add() costs O(points) and is called with bounded chunks; step() does one bounded piece of
-//              the solution
+// Work         add() costs O(points) and is called with bounded chunks; step() does one bounded piece
+//              of the solution
 // Memory       fixed by the settings, never by the number of points; all of it allocated in the constructor
 // Failure      Error::capacity, singular, not_finite, too_few_points
 #pragma once
@@ -31,8 +31,8 @@ struct SurfaceFitSettings {
   int max_shots = 64;
   double shot_sigma_mm = 0.013;  // 0: shots are taken as exact
   // The coarsest net is taken that misses no more than this (rms) of what the best net explains. Errors of
-  // pose in the plane look like steps of height where the plate slopes; below a few micrometres a finer net
-  // follows those.
+  // pose in the plane look like steps of height where the plate slopes; below a few micrometres a finer
+  // net follows those.
   double tolerance_mm = 0.005;
   double noise_mm = 0;    // of a point of weight 1; 0: estimated from the finest net's residual
   double fairing = 1e-5;  // relative to the data: the ratio of the matrices' traces

@@ -57,8 +57,8 @@ std::expected<Frame, Error> frame_of(const Derivatives& p) {
   return frame;
 }
 
-// With t1 = r_u / |r_u| and t2 = (r_v - s r_u) / q, s = F / E, q = area / |r_u|, the second form gives the
-// entries.
+// With t1 = r_u / |r_u| and t2 = (r_v - s r_u) / q, s = F / E, q = area / |r_u|, the second form
+// gives the entries.
 Shape shape_of(const Frame& frame) {
   const FundamentalForms& w = frame.forms;
   const double s = w.f / w.e, inverse_area = 1 / frame.area;
@@ -105,8 +105,8 @@ std::expected<Curvature, Error> curvature_at(const SurfacePoint& point, double u
 
 namespace {
 
-// The control points of the curve r(u, .) and of its u derivatives, for one fixed u: a row of nodes shares
-// them.
+// The control points of the curve r(u, .) and of its u derivatives, for one fixed u: a row of
+// nodes shares them.
 class NetAlong {
  public:
   explicit NetAlong(const BSplineSurface& surface)

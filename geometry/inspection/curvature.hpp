@@ -1,18 +1,18 @@
-// How a surface bends at a point: fundamental forms, normal, Gaussian, mean, principal and absolute
-// curvature.
+// How a surface bends at a point: fundamental forms, normal, Gaussian, mean, principal
+// and absolute curvature.
 //
 // Source       thesis eq. 2.16, 2.18-2.19 (forms), 2.21 (normal), 2.24 (K, H), 2.25 (principal), figures 6-6
 //              and 6-11 (absolute). K, H and the principal curvatures come from the shape operator in an
 //              orthonormal tangent basis, not from sqrt(H^2 - K), which loses half the digits near umbilics.
 // Signs        the normal is r_u x r_v; a curvature is positive where the surface bends towards it. With x
 //              along u, y along v and z up: a bowl is positive, a dome negative, a saddle has K < 0.
-//              Exchanging u and v changes the signs of H, k1, k2 (and with them which is larger), never that
-//              of K.
+//              Exchanging u and v changes the signs of H, k1, k2 (and with them which is larger), never
+//              that of K.
 // Units        curvatures 1/mm, K 1/mm^2, directions (du, dv) per mm of travel, tangents unit vectors
-// Accuracy     k1, k2, H and both entries' difference within 32 eps c B, B = (|r_uu| G + 2 |r_uv| sqrt(EG) +
-//              |r_vv| E) / (EG - F^2), c = sqrt(EG / (EG - F^2)), one over the sine between the parameter
-//              lines; K within that times |k1| + |k2| + itself. A principal direction within that over k1 -
-//              k2 (rad).
+// Accuracy     k1, k2, H and both entries' difference within 32 eps c B, B = (|r_uu| G + 2 |r_uv| sqrt(EG)
+//              + |r_vv| E) / (EG - F^2), c = sqrt(EG / (EG - F^2)), one over the sine between the
+//              parameter lines; K within that times |k1| + |k2| + itself. A principal direction within
+//              that over k1 - k2 (rad).
 // Cost         curvature_at 1.3 times, curvature_map with its evaluation 0.9 times a surface point with all
 //              derivatives (38 ns on a quiet machine) a node
 // Allocation   curvature_map one row of the control net; the others none
@@ -37,8 +37,8 @@ struct FundamentalForms {
   double e = 0, f = 0, g = 0;  // first: E = r_u.r_u, F = r_u.r_v, G = r_v.r_v
   double l = 0, m = 0, n = 0;  // second: L = r_uu.N, M = r_uv.N, N = r_vv.N
 
-  // Of the curve that leaves the point towards (du, dv), which must not be (0, 0); its length does not
-  // matter.
+  // Of the curve that leaves the point towards (du, dv), which must not be (0, 0); its length
+  // does not matter.
   double normal_curvature(double du, double dv) const {
     return (l * du * du + 2 * m * du * dv + n * dv * dv) / (e * du * du + 2 * f * du * dv + g * dv * dv);
   }

@@ -9,8 +9,8 @@
 //              before while the points come close together, else from a global search: right in any order,
 //              fast in the order of the scan
 // Frame        points are carried by `design_from_plate` to the surface's frame; mm
-// Accuracy     deviations within 1e-11 mm, feet within 1e-6 mm along the surface, for plates within 1e4 mm of
-//              the origin
+// Accuracy     deviations within 1e-11 mm, feet within 1e-6 mm along the surface, for plates within 1e4 mm
+//              of the origin
 // Cost         0.1..0.25 us a point within 20 mm of an explicit surface; a summary 20 ns a point
 // Allocation   none
 // Failure      Error::not_finite or too_large with the point's index: nothing after it has been written.
@@ -59,8 +59,8 @@ struct DeviationSummary {
 // `scratch` holds at least as many numbers as there are deviations. All zero without a single counting point.
 DeviationSummary summarize(std::span<const Deviation>, std::span<double> scratch);
 
-// Deviations gathered on a grid of (u, v): what a picture or a report shows. The caller's cells, rows along
-// u.
+// Deviations gathered on a grid of (u, v): what a picture or a report shows. The caller's cells,
+// rows along u.
 struct DeviationCell {
   std::uint32_t count = 0;
   double sum_mm = 0, least_mm = 0, most_mm = 0;

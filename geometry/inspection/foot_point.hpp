@@ -3,9 +3,8 @@
 // Method       Newton on (r - p) . r_u = (r - p) . r_v = 0 with second derivatives (as Piegl and Tiller, The
 //              NURBS Book, 6.1, but as a minimization): every step solves the quadratic model on the
 //              parameter rectangle exactly, is taken only as far as it gets nearer, and on a Hessian shifted
-//              until it is positive where it is not. The global search is branch and bound over the boxes
-//              of the Bezier patches, cut finer until the squared distance is convex on each piece that is
-//              left
+//              until it is positive where it is not. The global search is branch and bound over the boxes of
+//              the Bezier patches, cut finer until the squared distance is convex on each piece that is left
 // Frame        the surface's, mm
 // Border       a point whose nearest place is on the border gets that place: `side` or `corner` says so,
 //              overhang_mm how far the point stands beyond. A foot exactly on the border with nothing beyond

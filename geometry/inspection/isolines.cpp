@@ -90,8 +90,8 @@ void link_cell(const std::array<double, 4>& corner, const std::array<std::uint32
   };
   if (ins == 1) return link(in[0], out[0]);
   // Two opposite corners above. If the saddle of the bilinear interpolant is above too, they are joined and
-  // the lines cut off the corners below, each from its fall to the rise after it. Otherwise they cut off the
-  // corners above.
+  // the lines cut off the corners below, each from its fall to the rise after it. Otherwise they cut off
+  // the corners above.
   const double saddle =
       (corner[0] * corner[2] - corner[1] * corner[3]) / (corner[0] + corner[2] - corner[1] - corner[3]);
   const bool joined = saddle >= level;

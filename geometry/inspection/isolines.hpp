@@ -1,6 +1,6 @@
 // Lines on which a scalar field over (u, v) has one value: contours of height, deviation or curvature,
-// isophotes; and isoparametric lines. Polylines in the domain, lifted on the surface where they are wanted in
-// space.
+// isophotes; and isoparametric lines. Polylines in the domain, lifted on the surface where they are
+// wanted in space.
 //
 // Method       marching squares. A line's vertices lie on the edges of the grid; a cell with two opposite
 //              corners above the level is decided by the value at the saddle of its bilinear interpolant
@@ -11,9 +11,8 @@
 //              of the grid.
 // Accuracy     trace: linear along an edge of length h, |f - level| <= h^2 / 8 max |f''| along the edges.
 //              refine: the field's own crossing on the edge, to 8 eps of the domain's size or to the level
-//              exactly; so |f - level| <= 8 eps max |f'|, and the field's own rounding.
-//              isoparametric_line: chords within the tolerance asked for, since a cubic's second derivative
-//              is linear
+//              exactly; so |f - level| <= 8 eps max |f'|, and the field's own rounding. isoparametric_line:
+//              chords within the tolerance asked for, since a cubic's second derivative is linear
 // Cost         trace about 5 ns a node; refine about 12 evaluations of the field a vertex
 // Allocation   what is returned, and one index an edge of the grid
 // Failure      Error::too_few_points (less than 2 x 2 nodes, or values that do not fill the grid), not_finite
@@ -86,9 +85,9 @@ inline Eigen::Vector2d between(const Eigen::Vector2d& from, const Eigen::Vector2
   return to - (1 - t) * (to - from);
 }
 
-// Moves every vertex along its edge to where the field itself crosses the level. The ends of the edge keep
-// the crossing between them: a secant that never leaves its bracket (Illinois), helped by a halving every
-// fourth step.
+// Moves every vertex along its edge to where the field itself crosses the level. The ends of the edge
+// keep the crossing between them: a secant that never leaves its bracket (Illinois), helped by a halving
+// every fourth step.
 template <ScalarField Field>
 void refine_isolines(Isolines& lines, const Field& field, double level) {
   constexpr double least = 4 * std::numeric_limits<double>::epsilon();
@@ -138,9 +137,9 @@ struct HeightOn {
   double operator()(double u, double v) const { return up.dot(surface.at(u, v).value); }
 };
 
-// Where the normal makes `angle` (rad, [0, pi]) with the direction towards the light, on a grid of nu x nv
-// nodes, refined. The light's length does not matter. At 0 and pi an isophote is a point, which no grid
-// shows.
+// Where the normal makes `angle` (rad, [0, pi]) with the direction towards the light, on a grid of nu
+// x nv nodes, refined. The light's length does not matter. At 0 and pi an isophote is a point, which
+// no grid shows.
 std::expected<Isolines, Error> isophotes(const BSplineSurface&, const Eigen::Vector3d& towards_light,
                                          double angle, int nu, int nv);
 

@@ -24,8 +24,8 @@ constexpr double sigma_from_mad = 1.4826;  // of normal noise
 constexpr double weak_ratio = 5;
 constexpr double penetration_mm = 1e-9;
 constexpr double least_damping = 1e-6, first_damping = 1e-3, more_damping = 30, most_damping = 1e12;
-// Steps below these are taken without asking for a lower sum: rounding hides it, or points beyond the border
-// do.
+// Steps below these are taken without asking for a lower sum: rounding hides it, or points beyond
+// the border do.
 constexpr double unseen_mm = 1e-3, trusted_mm = 1;
 constexpr double coarse_mm = 0.1;  // enough to tell which points stand beyond the border
 constexpr int most_rounds = 8;     // of leaving such points out
@@ -72,9 +72,9 @@ struct FreeDirections {
   }
 };
 
-// Eigenvalues of a symmetric matrix, ascending, and its eigenvectors, by Jacobi's rotations (Golub and Van
-// Loan, 8.5): every rotation makes one pair of entries zero, and six sweeps leave nothing that a double could
-// show.
+// Eigenvalues of a symmetric matrix, ascending, and its eigenvectors, by Jacobi's rotations (Golub and
+// Van Loan, 8.5): every rotation makes one pair of entries zero, and six sweeps leave nothing that a
+// double could show.
 struct Axes {
   Vector values;
   Square vectors = Square::Identity();
@@ -117,8 +117,8 @@ struct Axes {
 
 std::optional<InspectionError> fault_of(std::span<const Vector3d> points,
                                         const LocalizationSettings& settings, int free) {
-  // Three points fix a pose only together with the surface's curvature; six equations are the least there
-  // must be.
+  // Three points fix a pose only together with the surface's curvature; six equations are the least
+  // there must be.
   if (points.size() < static_cast<std::size_t>(std::max(3, free)))
     return InspectionError{Error::too_few_points};
   if (!settings.weights.empty() && settings.weights.size() != points.size())

@@ -8,16 +8,16 @@
 //              larger is taken back and damped (Levenberg-Marquardt). One-sided: from there, a sequence of
 //              least distance programs on the linearized constraints (least_distance.hpp). Robust: reweighted from
 //              the second pass on, and before the end a search for a pose that half of the points agree on
-// Outliers     a robust fit bears 30 % of the points, one-sided, scattered or all in one corner, from starts 17 degrees
-//              and 27 mm off; from 40 degrees and 60 mm 30 % scattered or 10 % together. Where it cannot tell, it does
-//              not converge; only a third that stands together within some 20 sigma of the plate can bend the
-//              pose unseen
+// Outliers     a robust fit bears 30 % of the points, one-sided, scattered or all in one corner, from starts 17
+//              degrees and 27 mm off; from 40 degrees and 60 mm 30 % scattered or 10 % together. Where it cannot
+//              tell, it does not converge; only a third that stands together within some 20 sigma of the plate can
+//              bend the pose unseen
 // Frame        points in the plate's frame, the motion to the design's; mm, rad
 // Covariance   of the small motion (t, w) after the result, q -> c + exp([w])(q - c) + t, c the points'
 //              centroid in the design frame: t in mm first, then w in rad, about the design's axes. sigma^2
-//              (J' W J)^-1, for a robust fit with Huber's factor for the biweight. Fixed directions have zero
-//              rows. Of a one-sided result: of the free fit's equations at that place, without regard to the
-//              contacts
+//              (J' W J)^-1, for a robust fit with Huber's factor for the biweight. Fixed directions have
+//              zero rows. Of a one-sided result: of the free fit's equations at that place, without regard
+//              to the contacts
 // Accuracy     stops when a step moves the points by less than `settled_mm` (rms); one-sided results break
 //              their bound by less than 1e-9 mm
 // Cost         0.13 us a point and iteration; 3 to 8 iterations, robust 12 to 25
@@ -45,14 +45,14 @@ enum class AllowedSide { both, above, below };  // of the surface's normal
 struct LocalizationSettings {
   RigidMotion start = RigidMotion::Identity();  // a first design_from_plate; 40 degrees and 60 mm off will do
   std::span<const double> weights;  // empty: all 1. In units of 1 / variance if they are to mean that
-  // Directions in which the pose stays where the start has it: shifts along and small turns about the
-  // design's axes.
+  // Directions in which the pose stays where the start has it: shifts along and small turns about
+  // the design's axes.
   std::array<bool, 6> fixed{};
   bool robust = false;  // Tukey's biweight at 4.685 times the spread of the residuals (from their median)
   AllowedSide side = AllowedSide::both;
   double tolerance_mm = 0;  // by how much one-sided points may be on the other side
-  // A point that stands farther beyond the design's border than this is left out in the end: it has no
-  // partner there.
+  // A point that stands farther beyond the design's border than this is left out in the end: it has
+  // no partner there.
   double border_tolerance_mm = 0.5;
   double sigma_mm = 0;  // noise of a point of weight 1; 0: from the residuals
   double settled_mm = 1e-6;

@@ -86,8 +86,8 @@ SpanBounds bounds_of(const BezierNet& net, double width_u, double width_v) {
       dv[static_cast<std::size_t>(4 * i + j)] = 3 / width_v * (net[j][i + 1] - net[j][i]);
     }
   }
-  // A derivative is a mean of its control vectors: no shorter than the least of their shares along any
-  // direction.
+  // A derivative is a mean of its control vectors: no shorter than the least of their shares
+  // along any direction.
   const auto least_square = [](const std::array<Vector3d, 12>& all) {
     Vector3d sum = Vector3d::Zero();
     for (const Vector3d& d : all) sum += d;
@@ -257,8 +257,8 @@ void PreparedSurface::build_plan(const BSplineSurface& surface) {
       const FootPoint foot = foot_near(flat, p, from.u, from.v);
       from = {foot.u, foot.v};
       if (j == 0) row = from;
-      // Beyond the border the map goes on straight, so that the cells which the border crosses hold a smooth
-      // map.
+      // Beyond the border the map goes on straight, so that the cells which the border crosses hold
+      // a smooth map.
       const SurfaceJet jet = flat.span_at(foot.u, foot.v).at(foot.u, foot.v);
       const double xu = jet.du.xy[0], yu = jet.du.xy[1], xv = jet.dv.xy[0], yv = jet.dv.xy[1];
       const double dx = p.x() - foot.point.x(), dy = p.y() - foot.point.y(), area = xu * yv - xv * yu;

@@ -8,8 +8,8 @@
 //              second order of a table cell
 // Cost         at() about 40 ns; built in 16 x 6 multiply-adds a span, 0.5 ms for 20 x 20 spans
 // Memory       about 0.8 kB a span and 16 B a table node; bytes() says it
-// Allocation   in from() only; every other call is const, touches no heap and may run in several threads at
-//              once
+// Allocation   in from() only; every other call is const, touches no heap and may run in several
+//              threads at once
 // Failure      Error::knots_not_increasing, not_finite, too_few_points (a net smaller than 4 x 4, or one that
 //              does not fit its knots)
 #pragma once

@@ -1,13 +1,13 @@
 // One knot span of a bicubic surface as a polynomial, and its value with all first and second derivatives.
 //
-// Form         sum_ij c[j][i] s^i t^j with s = u - middle_u, t = v - middle_v, added to `origin` (a control
-//              point of the span). The coefficients are as small as the span, not as the surface, so that a
-//              difference to a point near by keeps its digits however far from the frame's origin the plate
-//              lies
+// Form         sum_ij c[j][i] s^i t^j with s = u - middle_u, t = v - middle_v, added to `origin` (a
+//              control point of the span). The coefficients are as small as the span, not as the surface,
+//              so that a difference to a point near by keeps its digits however far from the frame's
+//              origin the plate lies
 // Frame        the surface's, mm; s and t in units of the knots
 // Accuracy     8 eps times the span's extent, derivatives relative to theirs (prepared_surface.hpp)
-// Cost         38 multiply-adds on x, y, z at once; a vector is two pairs of doubles, which every 64-bit
-//              target has
+// Cost         38 multiply-adds on x, y, z at once; a vector is two pairs of doubles, which every
+//              64-bit target has
 // Determinism  no operation depends on the target: the same bits everywhere
 // Allocation   none
 #pragma once

@@ -1,6 +1,6 @@
-// Cholesky factorization of a symmetric positive definite band matrix, and its triangular solves, in slices
-// of columns: the work of a control tick is bounded, the numbers are those of one go, bit for bit, on any
-// vector unit.
+// Cholesky factorization of a symmetric positive definite band matrix, and its triangular solves, in
+// slices of columns: the work of a control tick is bounded, the numbers are those of one go, bit for bit,
+// on any vector unit.
 //
 // Storage      the lower band, column by column: entry(i, j) for j <= i <= j + half_band
 // Accuracy     that of Cholesky without pivoting: |L L' - A| <= (half_band + 2) eps |L| |L'| entry by entry
@@ -40,8 +40,8 @@ class BandCholesky {
   int smallest_column() const { return pivots_.smallest_column; }
   int failed_column() const { return pivots_.failed_column; }  // -1: none
 
-  // One slice of L y = b, columns [first, end) in ascending order, and of L' x = y, in descending order; in
-  // place.
+  // One slice of L y = b, columns [first, end) in ascending order, and of L' x = y, in descending
+  // order; in place.
   void solve_lower(std::span<double> x, int first, int end) const;
   void solve_upper(std::span<double> x, int first, int end) const;
 

@@ -1,13 +1,13 @@
-// Least squares with a banded matrix, row by row: every equation is rotated into a triangle as it comes and
-// can be forgotten. What curve fits and lofts are solved with; one equation an unknown makes it
-// interpolation.
+// Least squares with a banded matrix, row by row: every equation is rotated into a triangle as it
+// comes and can be forgotten. What curve fits and lofts are solved with; one equation an unknown
+// makes it interpolation.
 //
 // Source       Givens rotations on the observation matrix (de Boor 1978, FITPACK's fpcurf); no normal
 //              equations, so the condition number is not squared
 // Accuracy     backward stable: the solution of equations that differ by 4 eps for every equation and unknown
 //              of the band
-// Cost         6 band (band + right sides) flops an equation; memory unknowns (band + right sides), never
-//              equations
+// Cost         6 band (band + right sides) flops an equation; memory unknowns (band + right
+//              sides), never equations
 // Allocation   the constructor and solve()
 // Failure      Error::singular from solve(): a pivot below unknowns * eps of the largest; pivots() says which
 #pragma once

@@ -1,5 +1,5 @@
-// Bernstein polynomials of the two degrees that the surface fit lives on: cubics, and sextics for their
-// products.
+// Bernstein polynomials of the two degrees that the surface fit lives on: cubics, and sextics
+// for their products.
 //
 // Accuracy     sums of nonnegative terms throughout: nothing cancels on [0, 1]
 // Cost         constant
@@ -35,9 +35,9 @@ constexpr void raise_bernstein(double* row, int k, double t) {
   row[0] = (1 - t) * row[0];
 }
 
-// R with B_p^n(a + (b - a) t) = sum_l R[p][l] B_l^n(t) (thesis eq. 3.6): the blossom of B_p^n at n - l times
-// a and l times b. restrict_bernstein() of bernstein_form.hpp is the same for a degree known only at run
-// time.
+// R with B_p^n(a + (b - a) t) = sum_l R[p][l] B_l^n(t) (thesis eq. 3.6): the blossom of B_p^n at n - l
+// times a and l times b. restrict_bernstein() of bernstein_form.hpp is the same for a degree known only
+// at run time.
 template <int degree>
 constexpr std::array<std::array<double, degree + 1>, degree + 1> restriction(double a, double b) {
   std::array<std::array<double, degree + 1>, degree + 1> r{};

@@ -3,8 +3,8 @@
 // A form is a matrix with a row for every coefficient, 0..n, and a column for every axis: a polynomial curve
 // of degree n = rows - 1 over [0, 1]. Coefficients have any unit; nothing here knows what they measure.
 //
-// Domain       t, a, b in [0, 1] for the bounds below; outside it the polynomials go on, the bounds do not
-//              hold
+// Domain       t, a, b in [0, 1] for the bounds below; outside it the polynomials go on, the bounds
+//              do not hold
 // Accuracy     relative, for every entry of a basis or a matrix (all are sums of nonnegative terms);
 //              times the largest coefficient for what is done to a form. eps is 2^-52.
 // Allocation   what is returned
@@ -29,8 +29,8 @@ double binomial(int n, int k);
 Eigen::VectorXd bernstein_basis(int degree, double t);
 Eigen::VectorXd bernstein_basis_by_definition(int degree, double t);
 
-// Row k: the k-th derivatives of B_0^n ... B_n^n at t, k = 0..orders. Within 2^(k + 1) n!/(n - k)! n eps,
-// absolute.
+// Row k: the k-th derivatives of B_0^n ... B_n^n at t, k = 0..orders. Within 2^(k + 1) n!/(n - k)!
+// n eps, absolute.
 Eigen::MatrixXd bernstein_derivatives(int degree, double t, int orders);
 
 // Bernstein polynomials of degree n restricted to [a, b] of [0, 1] (eq. 3.6).

@@ -1,5 +1,5 @@
-// Bezier curves and surfaces of any degree, and the Bezier pieces of B-splines (thesis sections 2.3, 2.4,
-// 3.2).
+// Bezier curves and surfaces of any degree, and the Bezier pieces of B-splines (thesis sections
+// 2.3, 2.4, 3.2).
 //
 // Units        those of the control points; parameters in [0, 1]
 // Accuracy     values, pieces, raised degrees and restrictions within 4 n eps of the largest control

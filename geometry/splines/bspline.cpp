@@ -13,8 +13,8 @@ namespace {
 
 using BasisToSecond = std::array<double, 3 * (most_spline_degree + 1)>;
 
-// Two doubles side by side: what every 64-bit machine has registers for, so that one order of summation
-// serves all.
+// Two doubles side by side: what every 64-bit machine has registers for, so that one order of
+// summation serves all.
 using Pair [[gnu::vector_size(16)]] = double;
 
 Pair first_of(Pair a, Pair b) { return __builtin_shufflevector(a, b, 0, 2); }
@@ -40,8 +40,8 @@ Pair dots(const Four& a, const Four& wa, const Four& b, const Four& wb) {
   return first_of(pa, pb) + second_of(pa, pb);
 }
 
-// The rows of a bicubic patch summed along v: with the values of the basis there, its first, its second
-// derivatives.
+// The rows of a bicubic patch summed along v: with the values of the basis there, its first,
+// its second derivatives.
 struct SummedAlongV {
   Four value, first, second;
 };
@@ -107,8 +107,8 @@ SurfacePoint any_degree_at(const BSplineSurface& s, int ku, double u, int kv, do
 
 double refined_coefficient(std::span<const double> coarse, std::span<const double> coefficients,
                            std::span<const double> fine, int i) {
-  // De Boor's triangle with a different argument at every level evaluates the blossom of the piece that lies
-  // there.
+  // De Boor's triangle with a different argument at every level evaluates the blossom of the piece
+  // that lies there.
   const int k = find_span(coarse, 0.5 * (fine[i + 1] + fine[i + 3]));
   std::array<double, 4> d;
   for (int j = 0; j <= cubic; ++j) d[j] = coefficients[k - cubic + j];

@@ -2,14 +2,14 @@
 //
 // Source       thesis section 2.4: basis (2.45), de Boor's triangle (2.50, 2.51)
 // Units        control points in mm here; parameters in the knots' domain, arguments are clamped to it
-// Accuracy     values within 8 p eps of the largest control coordinate of the curve, 8 (p + q) eps for a
-//              surface of degrees p, q. First derivatives likewise of the largest control point of the
-//              derivative.
+// Accuracy     values within 8 p eps of the largest control coordinate of the curve, 8 (p + q) eps
+//              for a surface of degrees p, q. First derivatives likewise of the largest control point
+//              of the derivative.
 // Cost         bicubic value and all first and second derivatives 50 ns on a server core of 2023, some 30
 //              more where uneven knots must be searched; bi-quartic 230 ns
 // Allocation   none in at(), value() and de_boor()
-// Expects      knots that pass check_knots() with as many control points as there are; degrees <=
-//              most_spline_degree
+// Expects      knots that pass check_knots() with as many control points as there are;
+//              degrees <= most_spline_degree
 #pragma once
 
 #include "geometry/nonblocking.hpp"
@@ -23,10 +23,10 @@
 
 namespace moldloft::geometry {
 
-// Coefficient i, over the knots `fine`, of the cubic spline that has `coefficients` over the knots `coarse`;
-// `fine` must contain every knot of `coarse`. Exact: the spline's blossom at three consecutive fine knots
-// (Ramshaw 1987). Without allocation; refine_coefficients() of refinement.hpp does all at once, at any
-// degree.
+// Coefficient i, over the knots `fine`, of the cubic spline that has `coefficients` over the knots
+// `coarse`; `fine` must contain every knot of `coarse`. Exact: the spline's blossom at three consecutive
+// fine knots (Ramshaw 1987). Without allocation; refine_coefficients() of refinement.hpp does all at once,
+// at any degree.
 double refined_coefficient(std::span<const double> coarse, std::span<const double> coefficients,
                            std::span<const double> fine, int i);
 
@@ -64,8 +64,8 @@ struct SurfacePoint {
   Eigen::Vector3d normal() const { return du.cross(dv).normalized(); }
 };
 
-// r(u, v) = sum_ij N_i(u) M_j(v) P_ij, bicubic unless its degrees say otherwise; control points in world
-// coordinates (mm).
+// r(u, v) = sum_ij N_i(u) M_j(v) P_ij, bicubic unless its degrees say otherwise; control points in
+// world coordinates (mm).
 struct BSplineSurface {
   std::vector<double> knots_u, knots_v;
   Eigen::MatrixXd x, y, z;  // control net: rows along u, columns along v
@@ -77,8 +77,8 @@ struct BSplineSurface {
   SurfacePoint at(double u, double v) const;
 };
 
-// What check_knots() finds in either direction, knots_wrong_count for nets of different or wrong sizes,
-// not_finite.
+// What check_knots() finds in either direction, knots_wrong_count for nets of different or
+// wrong sizes, not_finite.
 template <int dim>
 std::expected<void, Error> check(const BSplineCurve<dim>& curve);
 std::expected<void, Error> check(const BSplineSurface& surface);

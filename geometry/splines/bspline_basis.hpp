@@ -1,12 +1,12 @@
-// The B-spline basis (thesis eq. 2.45) on one span: values, derivatives, and its polynomials in Bernstein
-// form.
+// The B-spline basis (thesis eq. 2.45) on one span: values, derivatives, and its polynomials
+// in Bernstein form.
 //
 // Only the degree + 1 functions N_{k-p} ... N_k live on span k (knots[k] <= t <= knots[k+1], not empty).
 //
 // Domain       t in the span; outside it the same polynomials go on, and the bounds do not hold
 // Accuracy     values and piece_extraction() relative within 4 p eps (sums of nonnegative terms); a
-//              derivative of order m within 4 p eps times the sum of the absolute values of what it is the
-//              difference of
+//              derivative of order m within 4 p eps times the sum of the absolute values of what it is
+//              the difference of
 // Cost         p^2 for values; (m + 1) p^2 for derivatives to order m; the cubic 60 flops and 6 divisions
 // Allocation   none, but for the matrix that piece_extraction() returns
 #pragma once
@@ -39,8 +39,8 @@ void basis_derivatives(std::span<const double> knots, int degree, int k, double 
 // control points k-p ... k.
 Eigen::MatrixXd piece_extraction(std::span<const double> knots, int degree, int k, double a, double b);
 
-// The same recurrence for cubics, written out for a number or for lanes of them; knot[0..5] = knots[k-2 ..
-// k+3].
+// The same recurrence for cubics, written out for a number or for lanes of them; knot[0..5] =
+// knots[k-2 .. k+3].
 template <typename Real>
 struct CubicRow {
   Real value[4], first[4], second[4];

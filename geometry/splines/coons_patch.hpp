@@ -6,8 +6,8 @@
 // for any other.
 //
 // Units        millimetres; u and v in [0, 1], the curves' own parameters are stretched to that
-// Accuracy     the net agrees with the definition within 16 (p + q + knots inserted) eps of the largest
-//              coordinate
+// Accuracy     the net agrees with the definition within 16 (p + q + knots inserted) eps of
+//              the largest coordinate
 // Cost         a point: four curve points; the net: 12 flops and two curve refinements a control point
 // Allocation   none in at(); what is returned elsewhere
 // Failure      CoonsError: what check() finds in a curve, or corners_apart

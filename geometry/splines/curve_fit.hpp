@@ -1,8 +1,8 @@
 // Least squares B-spline curves through a stripe of points (thesis section 3.2.1; The NURBS Book 9.4): over
 // given knots, or with as few control points as a tolerance allows, or as many as cross-validation asks for.
 //
-// Units        those of the points (mm here); parameters in the knots' domain, [0, 1] where they are chosen
-//              here
+// Units        those of the points (mm here); parameters in the knots' domain, [0, 1] where they
+//              are chosen here
 // Accuracy     the least squares solution within 4 N p eps times the condition number of the collocation
 //              matrix, of the largest coordinate; a polynomial or spline that the knots can represent comes
 //              back within that
@@ -23,14 +23,14 @@ namespace moldloft::geometry {
 
 // too_few_points       fewer points than control points (`where`: how many there are)
 // not_finite           the point or parameter `where`
-// repeated_points      points where - 1 and where lie in one place, or the parameter `where` is below the one
-//                      before it
+// repeated_points      points where - 1 and where lie in one place, or the parameter `where` is below the
+//                      one before it
 // outside_domain       the parameter `where` lies off the knots' domain
 // sizes_differ         not as many parameters as points
 // span_without_points  Schoenberg and Whitney: control point `where` has no parameter of its own between
 //                      knots[where] and knots[where + degree + 1]
-// singular             it has, but so near the border of that span that rounding decides about control point
-//                      `where`
+// singular             it has, but so near the border of that span that rounding decides about
+//                      control point `where`
 // tolerance_not_met    `where`: the number of control points that came closest
 // what check_knots() finds, with `where` = 0
 struct CurveFitError {

@@ -1,5 +1,5 @@
-// Curves that a curve or a surface contains: derivatives, isoparametric lines, and the derivatives across
-// them.
+// Curves that a curve or a surface contains: derivatives, isoparametric lines, and the
+// derivatives across them.
 //
 // Source       thesis section 2.4; The NURBS Book (3.3) for derivatives, (3.14) for lines
 // Accuracy     isoparametric lines within 4 p eps of the largest control coordinate, p the degree across;

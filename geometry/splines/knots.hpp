@@ -4,8 +4,8 @@
 // Units        parameters; the surfaces of this project live on [0, 1], nothing here asks for that
 // Cost         find_span is constant where knots are nearly uniform, logarithmic where they are not
 // Allocation   what is returned
-// Failure      check_knots() names what is wrong with knots from outside; all else expects knots that passed
-//              it
+// Failure      check_knots() names what is wrong with knots from outside; all else expects knots
+//              that passed it
 #pragma once
 
 #include "geometry/error.hpp"
@@ -20,8 +20,8 @@ namespace moldloft::geometry {
 constexpr int cubic = 3;
 constexpr int most_spline_degree = 31;  // sizes the scratch space that evaluation keeps on the stack
 
-// Clamped knots on [0, 1] with `spans` equal spans: (0,0,0,0, 1/s, ..., 1,1,1,1). Control points: spans +
-// degree.
+// Clamped knots on [0, 1] with `spans` equal spans: (0,0,0,0, 1/s, ..., 1,1,1,1). Control points:
+// spans + degree.
 std::vector<double> uniform_clamped_knots(int spans, int degree = cubic);
 
 // What from outside may be wrong, in this order: knots_wrong_count (n + p + 1 are due, n > p), not_finite,
@@ -59,9 +59,9 @@ std::vector<double> snap_knots(std::span<const double> knots, std::span<const do
 // of `degree` consecutive parameters, so that Schoenberg and Whitney are content (de Boor 1978).
 std::vector<double> averaged_knots(std::span<const double> parameters, int degree = cubic);
 
-// Knots for least squares at increasing parameters: interior knots such that every span holds about the same
-// number of them, and at least one (Piegl and Tiller, The NURBS Book, eq. 9.69). degree < control_points <=
-// parameters.
+// Knots for least squares at increasing parameters: interior knots such that every span holds about the
+// same number of them, and at least one (Piegl and Tiller, The NURBS Book, eq. 9.69). degree <
+// control_points <= parameters.
 std::vector<double> balanced_knots(std::span<const double> parameters, int control_points,
                                    int degree = cubic);
 

@@ -41,8 +41,8 @@ BSplineSurface transposed(const BSplineSurface& s) {
   return {s.knots_v, s.knots_u, s.x.transpose(), s.y.transpose(), s.z.transpose(), s.degree_v, s.degree_u};
 }
 
-// Where a curve over these knots is cut at t: the knots of both halves, and the control point that they
-// share.
+// Where a curve over these knots is cut at t: the knots of both halves, and the control point
+// that they share.
 struct Cut {
   std::vector<double> left, right;
   int shared;

@@ -3,12 +3,12 @@
 //
 // Source       Boehm's insertion (thesis eq. 2.63, 2.64); Bezier extraction (thesis 2.4, 3.20-3.34); degree
 //              elevation by averaging the insertions that leave out one knot each (Prautzsch 1984)
-// Coefficients matrices, a row a control point, any number of columns: the axes of a curve, or a whole
-// surface net
+// Coefficients matrices, a row a control point, any number of columns: the axes of a curve, or a
+// whole surface net
 // Accuracy     the spline moves by at most 4 eps times its largest control coordinate for every degree and
 //              every knot inserted: 4 (p + inserted) eps
-// Cost         Boehm's insertion p rows changed, all behind it moved; elevation as many insertions as knots,
-//              squared
+// Cost         Boehm's insertion p rows changed, all behind it moved; elevation as many insertions
+//              as knots, squared
 // Allocation   what is returned
 // Failure      none; knots must pass check_knots(), new ones lie in the domain (asserted)
 #pragma once
@@ -35,8 +35,8 @@ SplineCoefficients insert_knot(std::span<const double> knots, int degree, const 
 Eigen::MatrixXd refine_coefficients(std::span<const double> knots, int degree, const Eigen::MatrixXd& rows,
                                     std::span<const double> fine);
 
-// The matrix that does so, fine control points by coarse ones: entries not negative, rows add up to 1,
-// banded.
+// The matrix that does so, fine control points by coarse ones: entries not negative, rows add up
+// to 1, banded.
 Eigen::MatrixXd refinement_matrix(std::span<const double> knots, int degree, std::span<const double> fine);
 
 // One degree more: every knot stands once more.
@@ -60,9 +60,9 @@ SplitCurve<dim> split(const BSplineCurve<dim>& curve, double t);
 template <int dim>
 BSplineCurve<dim> reversed(const BSplineCurve<dim>& curve);  // c(begin + end - t)
 
-// Both curves at the higher of their degrees over the union of their knots. With a tolerance above 0, knots
-// that close count as one, and a curve whose knot was moved changes by tolerance times its derivative
-// (knots.hpp).
+// Both curves at the higher of their degrees over the union of their knots. With a tolerance above
+// 0, knots that close count as one, and a curve whose knot was moved changes by tolerance times
+// its derivative (knots.hpp).
 template <int dim>
 void make_compatible(BSplineCurve<dim>& a, BSplineCurve<dim>& b, double tolerance = 0);
 

@@ -1,6 +1,6 @@
-// Cubic B-spline basis functions on a part of one knot span, in Bernstein form: what knot insertion to
-// multiplicity three (thesis eq. 3.20-3.33) and restriction to a segment (eq. 3.6) give together, in one
-// step.
+// Cubic B-spline basis functions on a part of one knot span, in Bernstein form: what knot insertion
+// to multiplicity three (thesis eq. 3.20-3.33) and restriction to a segment (eq. 3.6) give together,
+// in one step.
 //
 // Source       the blossom of a basis function at 3 - l times a and l times b (Ramshaw 1987)
 // Accuracy     for a, b in the span every entry is a sum of nonnegative terms: relative error <= 32 eps

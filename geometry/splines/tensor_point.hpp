@@ -1,5 +1,5 @@
-// The sum that evaluates a surface of any degrees: a patch of the net between the basis along u and that
-// along v.
+// The sum that evaluates a surface of any degrees: a patch of the net between the basis along u and
+// that along v.
 //
 // Cost         9 (p + 1) (q + 1) multiplications and additions for each axis
 // Allocation   none

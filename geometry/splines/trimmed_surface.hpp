@@ -4,8 +4,8 @@
 //              lies to the left of every loop: the outer loop runs counter-clockwise in (u, v), holes run
 //              clockwise. A curve that is stored the other way round says so by `reversed`.
 // Border       an empty outer loop stands for the natural border, the rectangle of the knots
-// Images       a curve may carry its image in space: over the same parameter, and within `tolerance_mm` of
-//              the surface
+// Images       a curve may carry its image in space: over the same parameter, and within `tolerance_mm`
+//              of the surface
 // Units        (u, v) without unit, inside the surface's knots; images in mm
 // Cost         check: 16 points a span of every curve, then O(n^2) for the crossings of the n chords
 // Allocation   yes
@@ -34,16 +34,16 @@ struct TrimmedSurface {
   std::vector<TrimLoop> holes = {};
 };
 
-// The natural border as a loop of four curves, v = v0, u = u1, v = v1 (reversed), u = u0 (reversed). Their
-// images are the outer rows and columns of the control net, bit for bit: a clamped surface interpolates them
-// exactly.
+// The natural border as a loop of four curves, v = v0, u = u1, v = v1 (reversed), u = u0 (reversed).
+// Their images are the outer rows and columns of the control net, bit for bit: a clamped surface
+// interpolates them exactly.
 TrimLoop natural_border(const BSplineSurface&);
 
 PlanCurve reversed(const PlanCurve&);
 SpaceCurve reversed(const SpaceCurve&);
 
-// The cubic spline over `parameter` (increasing) that has the given values and slopes there; double knots,
-// C1.
+// The cubic spline over `parameter` (increasing) that has the given values and slopes there;
+// double knots, C1.
 template <typename Vector>
 std::vector<Vector> hermite_control(const std::vector<double>& parameter, const std::vector<Vector>& value,
                                     const std::vector<Vector>& slope);
@@ -55,8 +55,8 @@ std::vector<double> hermite_knots(const std::vector<double>& parameter);
 // of the piece and must stay below half the tolerance there. The image meets the surface exactly at its ends.
 SpaceCurve image_on(const BSplineSurface&, const PlanCurve& path, double tolerance_mm);
 
-// The loop as chords of its curves, in the direction in which it is walked: `chords_a_span` for every knot
-// span.
+// The loop as chords of its curves, in the direction in which it is walked: `chords_a_span` for
+// every knot span.
 std::vector<Eigen::Vector2d> chords(const TrimLoop&, int chords_a_span = 16);
 
 // not_finite: NaN or infinity anywhere. knots_not_increasing: knots that decrease, or that do not fit their

@@ -1,6 +1,6 @@
-// The plate that the inspection benchmarks work on: 23 x 23 bicubic control points, 305 x 305 mm, about +-20
-// mm, like job P of the fit; and points at known places of it, from a generator that is the same on every
-// machine.
+// The plate that the inspection benchmarks work on: 23 x 23 bicubic control points, 305 x 305 mm, about
+// +-20 mm, like job P of the fit; and points at known places of it, from a generator that is the same
+// on every machine.
 #pragma once
 
 #include "geometry/rigid_motion.hpp"

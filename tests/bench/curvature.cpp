@@ -31,8 +31,8 @@ BSplineSurface plate() {
   return s;
 }
 
-// The egg crate of the thesis's size (11 x 11), under 16 stripes of 81 points whose parameters are guessed by
-// chord length.
+// The egg crate of the thesis's size (11 x 11), under 16 stripes of 81 points whose parameters are guessed
+// by chord length.
 struct Wave {
   BSplineSurface truth{uniform_clamped_knots(8), uniform_clamped_knots(8), {}, {}, {}};
   std::vector<Eigen::Vector3d> points;

@@ -38,8 +38,8 @@ std::vector<Chord> chords(double side, double angle, int stripes) {
   const double width = side * (c + s);  // seen along the stripes
   std::vector<Chord> all;
   for (int k = 0; k < stripes; ++k) {
-    // The line of points at distance d from the corner (side, 0) that the direction (c, s) leaves to the
-    // right.
+    // The line of points at distance d from the corner (side, 0) that the direction (c, s) leaves
+    // to the right.
     const double d = (k + 0.5) / stripes * width - side * s;
     const double px = -s * d, py = c * d;
     double from = -1e9, to = 1e9;

@@ -16,8 +16,8 @@ class Fitpack {
   Fitpack(const Fitpack&) = delete;
   Fitpack& operator=(const Fitpack&) = delete;
 
-  // Seconds of scipy.interpolate.LSQBivariateSpline on a control x control net; nothing where scipy is not
-  // installed.
+  // Seconds of scipy.interpolate.LSQBivariateSpline on a control x control net; nothing where scipy
+  // is not installed.
   std::optional<double> seconds(int control) const;
 
  private:

@@ -1,7 +1,7 @@
-// The thesis's program, as section 3.6 prints it: six nested loops that form the matrix of equation (3.13)
-// for one stripe, every Bernstein polynomial computed anew where it is needed, by its definition (2.27) or by
-// its recurrence (2.31). Slow on purpose: it is what the fast form is held against, in the tests and in
-// `moldloft-bench thesis`.
+// The thesis's program, as section 3.6 prints it: six nested loops that form the matrix of equation
+// (3.13) for one stripe, every Bernstein polynomial computed anew where it is needed, by its definition
+// (2.27) or by its recurrence (2.31). Slow on purpose: it is what the fast form is held against, in the
+// tests and in `moldloft-bench thesis`.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,5 @@
-// The parts of `moldloft-bench thesis`: chapter 6 of Ko's thesis done again, each with its published figures
-// beside ours.
+// The parts of `moldloft-bench thesis`: chapter 6 of Ko's thesis done again, each with its published
+// figures beside ours.
 #pragma once
 
 #include "bench/benchmark.hpp"

@@ -1,6 +1,6 @@
 // Sections 6.3 and 6.4: the car hood and the fuselage. The thesis prints how many curves, pieces and knots
-// there are, not the control nets; these are stand-ins of the same structure, so that the errors can be known
-// at all.
+// there are, not the control nets; these are stand-ins of the same structure, so that the errors can be
+// known at all.
 #include "bench/thesis.hpp"
 #include "bench/thesis_parts.hpp"
 

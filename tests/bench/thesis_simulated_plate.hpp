@@ -14,8 +14,8 @@ constexpr double plate_size_mm = 305;
 constexpr double height_noise_mm = 0.025;  // the scanner's height accuracy
 constexpr double robot_error_mm = 0.076;   // the robot's, in x and y, one draw a shot
 
-// A saddle as line heating leaves it, with the shallow furrow of every heating line. x, y in [0,
-// plate_size_mm].
+// A saddle as line heating leaves it, with the shallow furrow of every heating line. x, y
+// in [0, plate_size_mm].
 double plate_height(double x, double y);
 
 struct Noise {

@@ -71,8 +71,8 @@ Times times_of(const Stripes& stripes, int control, int runs) {
 
 Json thesis_table_6_3(const Options& options) {
   constexpr int count = 74;
-  // As the thesis's plate gives them, a third of the plate long; and as one long shot would, from border to
-  // border.
+  // As the thesis's plate gives them, a third of the plate long; and as one long shot would, from
+  // border to border.
   const Stripes shots =
       curves_of(plate_stripes(count, 200, {height_noise_mm, 0}, 63), uniform_clamped_knots(1));
   std::vector<SampledStripe> across;

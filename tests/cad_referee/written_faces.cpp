@@ -31,10 +31,10 @@ OcctFace through_iges(const geometry::TrimmedSurface& face) {
   return referee::read_iges(folder.file("face.igs"));
 }
 
-// A space curve within e of its image, piece by piece with the ends in common, differs in slope by 3.1 e / h
-// at most (the error of a Hermite piece is K s^2 (1-s)^2, at most K / 16; its slope at most 0.193 K / h): so
-// in length by 3.1 e a piece. OpenCASCADE's own quadrature of the length is asked to be as good as 1e-9 of
-// it.
+// A space curve within e of its image, piece by piece with the ends in common, differs in slope by 3.1 e /
+// h at most (the error of a Hermite piece is K s^2 (1-s)^2, at most K / 16; its slope at most 0.193 K /
+// h): so in length by 3.1 e a piece. OpenCASCADE's own quadrature of the length is asked to be as good as
+// 1e-9 of it.
 double length_bound(const geometry::TrimmedSurface& face, double length) {
   double pieces = 0;
   const auto loops = geometry::face_edges(face, label.closure_mm).value();
@@ -62,8 +62,8 @@ void check_face(const OcctFace& read, const geometry::TrimmedSurface& face) {
   CAPTURE(area.error);
   CAPTURE(length.error);
   CAPTURE(read.area_error);
-  // Trims are followed by OpenCASCADE along the path or the space curve: as far apart as the file says, all
-  // round.
+  // Trims are followed by OpenCASCADE along the path or the space curve: as far apart as the file
+  // says, all round.
   const double trims = face.outer.empty() && face.holes.empty() ? 0 : label.closure_mm * length.value;
   CHECK(std::abs(read.area - area.value) <= area.error + read.area * read.area_error + trims);
   CHECK(std::abs(read.outline - length.value) <= length.error + length_bound(face, length.value));

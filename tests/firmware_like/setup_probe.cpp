@@ -1,5 +1,5 @@
-// Sets the process up as far as it may, then asks for memory and threads as a program does later on, and says what
-// it got.
+// Sets the process up as far as it may, then asks for memory and threads as a program does later on, and says
+// what it got.
 #include "firmware_like/process_setup.hpp"
 
 #include <fmt/format.h>

@@ -11,8 +11,8 @@ namespace moldloft::test {
 std::size_t allocations() noexcept { return count.load(std::memory_order_relaxed); }
 }  // namespace moldloft::test
 
-// Under a sanitizer the allocator is the sanitizer's own: nothing is counted there, and the tests that ask
-// pass.
+// Under a sanitizer the allocator is the sanitizer's own: nothing is counted there, and the tests
+// that ask pass.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(MOLDLOFT_NO_HEAP_WATCH)
 // glibc's own entry points stand behind these names: operator new and Eigen's allocator both end here.
 extern "C" {

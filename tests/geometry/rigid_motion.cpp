@@ -49,8 +49,8 @@ TEST_CASE("at the gimbal yaw is zero and roll carries the turn") {
 }
 
 TEST_CASE("equation (5.1) of the thesis is a turn about joint 4 of a scanner held 140 mm out") {
-  // P' = R P + T with R = [[cos a, sin a, 0], [-sin a, cos a, 0], [0, 0, 1]], T = tip + (140 sin a, 140 cos
-  // a, 0).
+  // P' = R P + T with R = [[cos a, sin a, 0], [-sin a, cos a, 0], [0, 0, 1]], T = tip + (140 sin a, 140
+  // cos a, 0).
   const double a = 0.4;
   const Eigen::Vector3d tip(300, 200, 100), p(12, -7, 3);
   const Eigen::Vector3d thesis = Eigen::Vector3d(std::cos(a) * p.x() + std::sin(a) * p.y(),

@@ -27,8 +27,8 @@ class ScriptedRun {
 
   SimulatedRunOptions options;
 
-  // The configuration that fits the cell, with one line replaced; the line is told by its beginning. Returns what stood
-  // there.
+  // The configuration that fits the cell, with one line replaced; the line is told by its beginning. Returns
+  // what stood there.
   std::string set(const std::string& begins, const std::string& line) {
     std::istringstream lines{config()};
     std::string text, before;

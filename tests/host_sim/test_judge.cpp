@@ -13,9 +13,9 @@ using namespace moldloft::host_sim;
 
 namespace {
 
-// The plate's own saddle as a B-spline: z is quadratic, x and y linear, so a bicubic net holds it exactly.
-// Blossoms: linear functions have Greville abscissae as coefficients, x^2 has the mean of pairwise knot
-// products.
+// The plate's own saddle as a B-spline: z is quadratic, x and y linear, so a bicubic net holds it
+// exactly. Blossoms: linear functions have Greville abscissae as coefficients, x^2 has the mean of
+// pairwise knot products.
 geometry::BSplineSurface saddle_surface(const PlateInstance& plate, double lift_mm, double stretch_mm,
                                         double amplitude_mm = 10) {
   geometry::BSplineSurface s;

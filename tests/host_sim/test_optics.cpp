@@ -63,12 +63,12 @@ TEST_CASE("points on a cylinder lie on it, to float precision, from any pose") {
 }
 
 TEST_CASE("the plate's height throws the triangulation shadow that the camera's base gives") {
-  // Edge at x = 100 (left side of the plate), top at 20, table 20 below; camera at (+200, 0, 500) over the
-  // field.
+  // Edge at x = 100 (left side of the plate), top at 20, table 20 below; camera at (+200, 0, 500)
+  // over the field.
   const auto plate = resting(Shape::flat, 100 + 152.5, 0, 0, 20);
   const auto frame = exposed(without_noise(), plate, looking_at(100, 0, 20));
-  // In scanner coordinates the edge is at (0, 0): a sight line over it falls by 500 on 200, 20 below it is 8
-  // mm left.
+  // In scanner coordinates the edge is at (0, 0): a sight line over it falls by 500 on 200, 20 below it is
+  // 8 mm left.
   int missing = 0;
   double last_seen = -100, first_top = 100;
   for (const auto& stripe : frame.lines()) {
@@ -97,8 +97,8 @@ TEST_CASE("a second camera on the other side sees into the first one's shadow") 
 }
 
 TEST_CASE("a wall that faces the projector is hit between top and underside, and nowhere else") {
-  // The plate's right edge stands 40 mm left of the field's centre: rays lean onto its wall. Camera left of
-  // it.
+  // The plate's right edge stands 40 mm left of the field's centre: rays lean onto its wall. Camera
+  // left of it.
   auto settings = without_noise();
   settings.cameras = {{200, 0, 500}};
   const auto plate = resting(Shape::flat, -152.5, 0, 0, 20);

@@ -1,6 +1,6 @@
-// The programs as they are deployed, in real time: the controller on a TCP socket and a serial port, the
-// simulated devices behind them. Nothing here depends on how fast the machine answers; all waits have a
-// limit.
+// The programs as they are deployed, in real time: the controller on a TCP socket and a serial port,
+// the simulated devices behind them. Nothing here depends on how fast the machine answers; all waits
+// have a limit.
 #include "firmware_like/flight_files.hpp"
 #include "firmware_like/run_command.hpp"
 #include "hal/run_store.hpp"

@@ -16,10 +16,10 @@ MOLDLOFT_NATIVE double moldloft_read_floor(const double* u, const double* v, con
 // that looks at its points must do at least.
 MOLDLOFT_NATIVE double moldloft_basis_floor(const double* u, const double* v, std::size_t points, int spans);
 
-// Least squares on a uniform clamped control x control net as one would write it with Eigen: the sparse
-// matrix of basis values row by row, its normal equations, simplicial Cholesky with AMD ordering. u and v
-// in [0, 1]; `control_points` has room for control * control numbers, v running fastest. False if the
-// factorization fails.
+// Least squares on a uniform clamped control x control net as one would write it with Eigen: the
+// sparse matrix of basis values row by row, its normal equations, simplicial Cholesky with AMD
+// ordering. u and v in [0, 1]; `control_points` has room for control * control numbers, v running
+// fastest. False if the factorization fails.
 MOLDLOFT_NATIVE bool moldloft_plain_eigen_fit(const double* u, const double* v, const double* z,
                                               std::size_t points, int control, double* control_points);
 

@@ -75,8 +75,8 @@ inline double loop_length(const geometry::BSplineSurface& s, const geometry::Tri
   return sum;
 }
 
-// Green: the area left of a loop is the integral of F dv along it, F(u, v) the area element summed from the
-// first u.
+// Green: the area left of a loop is the integral of F dv along it, F(u, v) the area element summed from
+// the first u.
 inline double loop_area(const geometry::BSplineSurface& s, const geometry::TrimLoop& loop, int pieces) {
   double sum = 0;
   for (const auto& curve : loop) {

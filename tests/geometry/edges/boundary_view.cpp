@@ -128,8 +128,8 @@ TEST_CASE("corners of 60 and 120 degrees turn by their true angle") {
 }
 
 TEST_CASE("a corner near the field's limit is found from few points on one side") {
-  // Side 0 runs along +x at y = 0 and ends at x = 44: about seven stripes show the side that comes back at 45
-  // degrees.
+  // Side 0 runs along +x at y = 0 and ends at x = 44: about seven stripes show the side that comes back
+  // at 45 degrees.
   StripeScene scene;
   scene.outline = {{-300, 0}, {44, 0}, {144, 100}, {-300, 100}};
   Seen seen;

@@ -59,8 +59,8 @@ struct Errors {
   double corner = 0, curve_max = 0, curve_rms = 0;
 };
 
-// Distances of the fitted sides from the true ones, both sampled: a dense polyline of the truth is the
-// referee.
+// Distances of the fitted sides from the true ones, both sampled: a dense polyline of the truth
+// is the referee.
 Errors compare(const Outline& outline, const Shape& shape) {
   Errors errors;
   int count = 0;

@@ -58,8 +58,8 @@ inline RangeImage load_range_image(const std::string& name) {
   return image;
 }
 
-// Rows [first, end) as stripes. Scanner coordinates: y = column, x = row, both in mm from pixel (0, 0); z
-// above `datum`.
+// Rows [first, end) as stripes. Scanner coordinates: y = column, x = row, both in mm from pixel (0, 0);
+// z above `datum`.
 struct Stripes {
   std::vector<std::vector<float>> x, y, z;
   std::vector<geometry::StripeView> views;

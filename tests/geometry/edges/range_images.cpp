@@ -1,7 +1,7 @@
 // Edges on measured reality: two height maps that SICK ships with its samples (The Unlicense). Every row is
-// one laser profile, so rows are stripes and columns are points. The expected positions were read by eye from
-// enlarged pictures of the height maps, before anything was computed; the tolerances say how well they can be
-// read.
+// one laser profile, so rows are stripes and columns are points. The expected positions were read by eye
+// from enlarged pictures of the height maps, before anything was computed; the tolerances say how well they
+// can be read.
 #include "geometry/edges/boundary_view.hpp"
 #include "geometry/edges/plate_runs.hpp"
 #include "geometry/edges/range_image.hpp"
@@ -115,8 +115,8 @@ TEST_CASE(
       finder.find(stripes.views, {390 * image.stripe_mm, 280 * image.point_mm, 0}, whole_picture());
   REQUIRE(runs.has_value());
 
-  // The cut: column 114.5 at row 110, 104.5 at 120, 65 at 160, 46.5 at 180. Then the left side at
-  // column 30.7.
+  // The cut: column 114.5 at row 110, 104.5 at 120, 65 at 160, 46.5 at 180. Then the left side
+  // at column 30.7.
   const auto cut = agreement(
       *runs, image, first, 70, 185, false, [](int row) { return 104.5 - 0.968 * (row - 120); }, 2.5);
   const auto side = agreement(

@@ -121,8 +121,8 @@ TEST_CASE("stripes walked eight at a time are cut as each of them alone would be
 }
 
 TEST_CASE("a steady line leaves a walk in the state that it would have had alone") {
-  // What is decided at a step depends on the line up to it: noise just at the limit, many times, in every phase of the
-  // eight.
+  // What is decided at a step depends on the line up to it: noise just at the limit, many times, in every phase
+  // of the eight.
   for (unsigned seed = 0; seed < 200; ++seed) {
     std::vector<Stripe> stripes;
     for (std::size_t k = 0; k < 8; ++k) {

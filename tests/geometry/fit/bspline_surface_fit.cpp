@@ -42,8 +42,8 @@ BSplineSurface random_surface(std::vector<double> u, std::vector<double> v, int 
   return surface;
 }
 
-// The stripe on a surface along u = `at` or v = `at` is a B-spline curve over the surface's own knots,
-// exactly.
+// The stripe on a surface along u = `at` or v = `at` is a B-spline curve over the surface's
+// own knots, exactly.
 void add_isoline(const BSplineSurface& surface, bool along_v, double at, Stripes& stripes) {
   const std::vector<double>& across = along_v ? surface.knots_u : surface.knots_v;
   const int k = find_span(across, at);
@@ -217,8 +217,8 @@ TEST_CASE("the next measuring phase is solved on the stored factor") {
 }
 
 TEST_CASE("a stripe with a bent pre-image is matched on each of its straight parts") {
-  // x, y and z are cubics in (u, v) together, so that every straight line carries a cubic; at t = 0.4 the
-  // stripe bends.
+  // x, y and z are cubics in (u, v) together, so that every straight line carries a cubic; at t = 0.4
+  // the stripe bends.
   const auto position = [](const Vector2d& p) {
     const double u = p.x(), v = p.y();
     return Vector3d(u, v + 0.1 * u * u, u * u * v - 0.5 * v * v * v + u * v);

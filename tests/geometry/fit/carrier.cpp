@@ -84,8 +84,8 @@ TEST_CASE("hexagon, pentagon, triangle and disk have the least rectangle that is
   const auto disk = carrier_of(polygon(64)).value();
   CHECK(disk.trim.size() == 1);
   CHECK(std::abs(rectangle_area(disk) - 200 * 200) <= 2 * 200 * 2 * 100 * 1.3e-6);
-  // The chords of inside() lie within 1e-3 mm of the circle: by two thirds of that on average, over its
-  // circumference.
+  // The chords of inside() lie within 1e-3 mm of the circle: by two thirds of that on average,
+  // over its circumference.
   CHECK(std::abs(disk.covered - pi / 4) <= 1e-3 * 2 * pi * 100 / 40000 + 1e-5);
 }
 

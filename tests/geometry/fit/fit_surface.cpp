@@ -136,8 +136,8 @@ TEST_CASE("the chosen net follows the data, and a stated tolerance coarsens it")
   CHECK(bic->surface.control_u() <= fine->surface.control_u());
   CHECK(loose->surface.control_u() < fine->surface.control_u());
   CHECK(rms_error(loose->surface, everywhere) < 0.2);
-  // The theory of a net that can represent the truth: sigma sqrt(N / M); five deviations of a chi-squared
-  // of N.
+  // The theory of a net that can represent the truth: sigma sqrt(N / M); five deviations of a
+  // chi-squared of N.
   const double n = static_cast<double>(fine->surface.z.size());
   CHECK(rms_error(fine->surface, everywhere) <
         0.05 * std::sqrt(n / 40'000) * (1 + 5 / std::sqrt(2 * n)) * 1.2);

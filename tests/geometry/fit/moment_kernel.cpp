@@ -182,8 +182,8 @@ TEST_CASE(
                                         halve_u && halve_v ? &halves[3] : nullptr};
       CellMoments first;
       moment_kernel(Simd::portable).merge(in, first);
-      // Sums of 300 nonnegative terms, each good to some eps: 300 eps is generous, 1e-12 of the largest
-      // more so.
+      // Sums of 300 nonnegative terms, each good to some eps: 300 eps is generous, 1e-12 of the
+      // largest more so.
       for (std::size_t k = 0; k < 56; ++k)
         CHECK(first.gram[k] == doctest::Approx(truth.gram[k]).epsilon(1e-12));
       for (std::size_t k = 0; k < 16; ++k)

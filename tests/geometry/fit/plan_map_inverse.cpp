@@ -99,8 +99,8 @@ TEST_CASE("maps that fold, have no corner or no number are refused by name") {
   Outline deep = straight_outline({Vector2d(0, 0), {100, 0}, {100, 100}, {0, 100}});
   for (std::size_t i = 1; i + 1 < deep.sides[0].control.size(); ++i) deep.sides[0].control[i].y() += 150;
   CHECK(error(deep) == Error::folded_map);
-  // Corners on one line; a corner of 180 degrees, where rounding decides the sign of the Jacobian; sides
-  // without length.
+  // Corners on one line; a corner of 180 degrees, where rounding decides the sign of the Jacobian;
+  // sides without length.
   CHECK(error(straight_outline({Vector2d(0, 0), {100, 0}, {200, 0}, {300, 0}})) == Error::collinear);
   for (double turn = 0; turn < 6; turn += 0.37) {
     std::array<Vector2d, 4> triangle{Vector2d(0, 0), {100, 0}, {200, 0}, {80, 150}};

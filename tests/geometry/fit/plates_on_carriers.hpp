@@ -32,9 +32,9 @@ struct FittedPlate {
   double rms_mm = 0, max_mm = 0;  // against the truth, inside the outline
   double noise_mm = 0;  // sigma sqrt(N / M): what is left of the noise in a fit of N unknowns to M points
 
-  // A slope that is off by e changes the area element by less than (slope + e) e. The noise of the fit waves
-  // with a span at the shortest: its slope is at most 2 pi / span times its height, in each of two
-  // directions.
+  // A slope that is off by e changes the area element by less than (slope + e) e. The noise of the
+  // fit waves with a span at the shortest: its slope is at most 2 pi / span times its height, in each
+  // of two directions.
   double area_bound(const OddPlate& plate) const {
     const auto& c = carrier.outline.corners;
     const double span =
@@ -68,9 +68,9 @@ inline OddPlate hexagonal_plate() {
           0};
 }
 
-// A dish z = (x^2 + y^2) / (2 p) about its middle, p = 600: area 2 pi / 3 p^2 ((1 + (R/p)^2)^(3/2) - 1). The
-// outline's interpolation error is 5/384 h^4 / R^3 (smooth_sides.hpp), times the circumference, times the
-// steepest secant.
+// A dish z = (x^2 + y^2) / (2 p) about its middle, p = 600: area 2 pi / 3 p^2 ((1 + (R/p)^2)^(3/2) - 1).
+// The outline's interpolation error is 5/384 h^4 / R^3 (smooth_sides.hpp), times the circumference, times
+// the steepest secant.
 inline OddPlate round_plate() {
   const double radius = 150, p = 600, pi = std::numbers::pi, h = 2 * pi * radius / 72;
   const double off = 1.1 * 5.0 / 384 * std::pow(h, 4) / std::pow(radius, 3);

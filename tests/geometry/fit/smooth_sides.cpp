@@ -53,8 +53,8 @@ TEST_CASE(
     REQUIRE(sides.size() == 1);
     const auto& c = sides[0];
     CHECK(c.control.size() == static_cast<std::size_t>(n) + 3);
-    // Hall and Meyer 1976: 5/384 h^4 max |c''''|, which for an arc is 1 / R^3; 10 % for chord against arc
-    // length.
+    // Hall and Meyer 1976: 5/384 h^4 max |c''''|, which for an arc is 1 / R^3; 10 % for chord
+    // against arc length.
     const double bound = 1.1 * 5.0 / 384 * std::pow(h, 4) / std::pow(radius, 3);
     double worst = 0;
     for (int k = 0; k <= 2000; ++k) {

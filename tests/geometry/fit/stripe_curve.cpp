@@ -45,8 +45,8 @@ TEST_CASE("with chord lengths it is elsewhere, as far as the climb is uneven") {
       fit_stripe(stripe.points, stripe.uv, uniform_clamped_knots(8), StripeParameter::chord_length);
   REQUIRE(curve.has_value());
   CHECK(curve->max_mm < 0.02);  // the curve passes by the points all the same, to a tenth of what follows
-  // The stripe climbs from 0 to 5.8, so that half of its length lies beyond u = 0.7, its pre-image's middle
-  // at 0.5.
+  // The stripe climbs from 0 to 5.8, so that half of its length lies beyond u = 0.7, its pre-image's
+  // middle at 0.5.
   const Vector2d uv = curve->track.preimage.at(0.5);
   const Vector3d point = curve->curve.at(0.5).value;
   CHECK(point.x() > uv.x() + 0.1);

@@ -49,8 +49,8 @@ TEST_CASE("the rows times the control points are the Bernstein coefficients of t
       double surface = 0;
       for (int i = 0; i <= n1; ++i)
         for (int j = 0; j <= n2; ++j) surface += bu[i] * bv[j] * net[i * (n2 + 1) + j];
-      // Weights that are nonnegative and add up to 1, each within some 4 (n1 + n2) eps: so is the mean of [0,
-      // 1].
+      // Weights that are nonnegative and add up to 1, each within some 4 (n1 + n2) eps: so is the mean
+      // of [0, 1].
       CHECK(std::abs(bernstein_basis(n1 + n2, t).dot(form) - surface) < 8 * (n1 + n2) * 2.3e-16);
     }
   }

@@ -38,8 +38,8 @@ TEST_CASE("sixteen stripes of twenty control points are 272 Bezier curves before
 }
 
 TEST_CASE("a straight pre-image is cut where it crosses the knot lines and at the stripe's knots") {
-  // u = t meets 1/4, 1/2, 3/4; v = 0.1 + t / 2 meets 1/4 at t = 0.3 and 1/2 at t = 0.8; the stripe breaks at
-  // 1/3, 2/3.
+  // u = t meets 1/4, 1/2, 3/4; v = 0.1 + t / 2 meets 1/4 at t = 0.3 and 1/2 at t = 0.8; the stripe breaks
+  // at 1/3, 2/3.
   const auto pieces = cut(straight_preimage({0, 0.1}, {1, 0.6}), uniform_clamped_knots(3),
                           uniform_clamped_knots(4), uniform_clamped_knots(4));
   const double cuts[] = {0, 0.25, 0.3, 1.0 / 3, 0.5, 2.0 / 3, 0.75, 0.8, 1};

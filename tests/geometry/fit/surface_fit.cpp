@@ -39,8 +39,8 @@ std::expected<void, Error> fit(SurfaceFit& surface_fit, const PlanMap& map, cons
   }
 }
 
-// The definition, slow and dense: every point a row, every shot a column with its prior, fairing by
-// quadrature.
+// The definition, slow and dense: every point a row, every shot a column with its prior,
+// fairing by quadrature.
 struct DenseFit {
   VectorXd control;  // i * control_v + j
   double rss = 0;
@@ -107,8 +107,8 @@ DenseFit dense_fit(const PlanMap& map, const std::vector<Shot>& shots, int spans
   return fitted;
 }
 
-// A few shots of random points, each over its own rectangle of the unit square, with noise and an offset of
-// its own.
+// A few shots of random points, each over its own rectangle of the unit square, with noise and an offset
+// of its own.
 std::vector<Shot> random_shots(const PlanMap& map, const Height& height, int shots, int points, double noise,
                                double shot_sigma, unsigned seed) {
   std::mt19937 random(seed);
@@ -230,8 +230,8 @@ TEST_CASE("a height that a coarse net holds exactly is found exactly, and the co
 }
 
 TEST_CASE("what a coarser net misses decides against the tolerance which net is taken") {
-  // A ripple of 4 micrometres rms and 40 mm wavelength: 4 spans cannot follow it, 32 can, and the data show
-  // it clearly.
+  // A ripple of 4 micrometres rms and 40 mm wavelength: 4 spans cannot follow it, 32 can, and the data
+  // show it clearly.
   const PlanMap map(test::straight_outline(square));
   const Height rippled = [](double x, double) {
     return 100 + 0.0057 * std::sin(x * 2 * std::numbers::pi / 40);

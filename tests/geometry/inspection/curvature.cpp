@@ -230,8 +230,8 @@ TEST_CASE("Gaussian curvature does not change when a surface is bent without str
     const double u = 0.6, v = 0.2;
     double before = 0;
     for (const double a : {1.0, 0.8, 0.5}) {
-      // Profile a cos u, angle v / a, height with slope sqrt(1 - a^2 sin^2 u): the metric is that of the unit
-      // sphere.
+      // Profile a cos u, angle v / a, height with slope sqrt(1 - a^2 sin^2 u): the metric is that of
+      // the unit sphere.
       const double c = std::cos(v / a), s = std::sin(v / a),
                    z = std::sqrt(1 - a * a * std::sin(u) * std::sin(u));
       const double cu = std::cos(u), su = std::sin(u);
@@ -277,8 +277,8 @@ TEST_CASE("curvature is the same wherever the surface stands and however it is p
     CHECK(std::abs(here->k2 - again->k2) <= allowed);
     CHECK(std::abs(std::abs(here->tangent_1.dot(again->tangent_1)) - 1) < 1e-9);
 
-    // Exchanging u and v turns the normal over: the sign of H and of the principal curvatures, but not that
-    // of K.
+    // Exchanging u and v turns the normal over: the sign of H and of the principal curvatures, but not
+    // that of K.
     const auto turned = curvature_at({p.value, p.dv, p.du, p.dvv, p.duv, p.duu});
     CHECK(std::abs(turned->k1 + here->k2) <= 2 * bound(p));
     CHECK(std::abs(turned->mean + here->mean) <= 2 * bound(p));

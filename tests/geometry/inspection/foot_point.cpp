@@ -19,8 +19,8 @@ FootPoint guessed_foot(const PreparedSurface& surface, const Vector3d& p) {
   return foot_near(surface, p, guess.u, guess.v);
 }
 
-// The least distance over a fine grid: no foot may be farther, and none is nearer by more than the grid
-// misses.
+// The least distance over a fine grid: no foot may be farther, and none is nearer by more than
+// the grid misses.
 double sampled_distance(const BSplineSurface& surface, const Vector3d& p, int steps) {
   double least = std::numeric_limits<double>::infinity();
   for (int i = 0; i <= steps; ++i) {
@@ -146,8 +146,8 @@ TEST_CASE("a descent never ends farther away than it began, from any guess") {
 }
 
 TEST_CASE("distances from a cylinder are those from its axis, within what the spline misses of the circle") {
-  // Control points at R / cos-like radius; how far the spline is from the cylinder is measured on 2000
-  // samples.
+  // Control points at R / cos-like radius; how far the spline is from the cylinder is measured
+  // on 2000 samples.
   const double radius = 400;
   BSplineSurface surface = plate(12, 1, [](double, double) { return 0.0; });
   for (int i = 0; i < surface.control_u(); ++i) {

@@ -55,8 +55,8 @@ TEST_CASE(
     REQUIRE(lines->lines.size() == 1);
     const Isoline line = lines->lines[0];
     CHECK(line.closed);
-    // Along an edge the second derivative is 0.02 / mm: linear crossings miss the level by cell^2 / 8 of
-    // that.
+    // Along an edge the second derivative is 0.02 / mm: linear crossings miss the level by cell^2 /
+    // 8 of that.
     for (const Isolines::Vertex& vertex : lines->vertices) {
       CHECK(std::abs(height(vertex.uv.x(), vertex.uv.y()) - level) <= 0.02 * cell_mm * cell_mm / 8 + 1e-14);
     }
@@ -222,8 +222,8 @@ TEST_CASE("refined vertices lie on the level as exactly as the parameter can say
     evaluations = 0;
     refine_isolines(*lines, counted, level);
     CHECK(evaluations < 16 * static_cast<int>(lines->vertices.size()));
-    // The largest slope along u or v is 9.1; the field's own rounding is a few eps of 1.1 and of the angles 9
-    // and 7.
+    // The largest slope along u or v is 9.1; the field's own rounding is a few eps of 1.1 and of the angles
+    // 9 and 7.
     for (const auto& vertex : lines->vertices) {
       CHECK(std::abs(egg(vertex.uv.x(), vertex.uv.y()) - level) <= 8 * eps * 9.1 + 4 * eps * (1.1 + 9));
     }

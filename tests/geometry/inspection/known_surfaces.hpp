@@ -1,5 +1,5 @@
-// Surfaces whose distances are known without the code under test, and a slow evaluation in extended
-// precision.
+// Surfaces whose distances are known without the code under test, and a slow evaluation
+// in extended precision.
 #pragma once
 
 #include "geometry/rigid_motion.hpp"
@@ -111,8 +111,8 @@ inline SlowPoint slow_point(const BSplineSurface& s, double u, double v) {
   return point;
 }
 
-// How far (mm) p - r(u, v) is from standing upright on the surface: the larger of its parts along r_u and
-// r_v.
+// How far (mm) p - r(u, v) is from standing upright on the surface: the larger of its parts along
+// r_u and r_v.
 inline double off_orthogonal(const BSplineSurface& s, const Vector3d& p, double u, double v) {
   const SlowPoint r = slow_point(s, u, v);
   long double gu = 0, gv = 0, a = 0, c = 0;

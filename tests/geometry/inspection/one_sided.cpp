@@ -32,8 +32,8 @@ Seen seen_at(const PreparedSurface& design, const std::vector<Vector3d>& points,
   return seen;
 }
 
-// A plate that differs from its design by up to about half a millimetre, smoothly, with measuring noise on
-// top.
+// A plate that differs from its design by up to about half a millimetre, smoothly, with measuring
+// noise on top.
 std::vector<Vector3d> formed_plate(const BSplineSurface& design, int count) {
   std::mt19937 random(21);
   std::uniform_real_distribution<double> inside(0.03, 0.97);

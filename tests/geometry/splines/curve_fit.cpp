@@ -231,8 +231,8 @@ TEST_CASE("a control point that no parameter decides is named by Schoenberg and 
   CHECK(fit.error().where == 5);  // lives on (0.3, 0.7)
   // The dense matrix says the same in numbers.
   CHECK(condition(collocation(knots, 3, parameters)) > 1e15);
-  // Points in the gap bring it to life; two of them in one place are one, and then the next control point
-  // starves.
+  // Points in the gap bring it to life; two of them in one place are one, and then the next
+  // control point starves.
   const std::vector<double> enough{0.0, 0.05, 0.2, 0.25, 0.28, 0.35, 0.45, 0.55, 0.92, 0.95, 1.0};
   CHECK(first_without_parameter(knots, 3, enough, 0, 11) == 11);
   CHECK(condition(collocation(knots, 3, enough)) < 1e6);

@@ -11,8 +11,8 @@ namespace {
 
 const std::vector<double> places{0, 0.013, 0.11, 0.2504, 0.37, 0.5, 0.61, 0.777, 0.93, 1};
 
-// Both splines evaluated by the definition in extended precision, so that only the change of form is
-// measured.
+// Both splines evaluated by the definition in extended precision, so that only the change of
+// form is measured.
 template <int dim>
 double distance(const BSplineCurve<dim>& a, const BSplineCurve<dim>& b) {
   double most = 0;

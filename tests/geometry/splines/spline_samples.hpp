@@ -1,5 +1,5 @@
-// Seeded curves, surfaces and knots for the spline tests, and the basis from its definition in extended
-// precision.
+// Seeded curves, surfaces and knots for the spline tests, and the basis from its definition
+// in extended precision.
 #pragma once
 
 #include "geometry/splines/bspline.hpp"
@@ -49,8 +49,8 @@ struct Numbers {
   double in(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
   int of(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); }
 
-  // Clamped knots on [0, 1] with `interior` uneven interior knots, some of them double where the degree
-  // allows it.
+  // Clamped knots on [0, 1] with `interior` uneven interior knots, some of them double where the
+  // degree allows it.
   std::vector<double> knots(int degree, int interior) {
     std::vector<double> inner(static_cast<std::size_t>(interior));
     for (double& t : inner) t = in(0.02, 0.98);

@@ -95,8 +95,8 @@ TEST_CASE("a joint tells its kink and its step") {
 }
 
 TEST_CASE("the nearest pairs are joined first, and what is too far away stays alone") {
-  // The second shot lies 9 mm off in y: nearer to the neighbour's line at -11 mm is nobody, 9 mm are too many
-  // at 5.
+  // The second shot lies 9 mm off in y: nearer to the neighbour's line at -11 mm is nobody, 9 mm are too
+  // many at 5.
   const std::vector<StripesOfShot> shots{shot(0, 100, 3), shot(101, 200, 3, 9)};
   const auto strict = join_stripes(shots);
   REQUIRE(strict.has_value());
@@ -106,8 +106,8 @@ TEST_CASE("the nearest pairs are joined first, and what is too far away stays al
   REQUIRE(loose.has_value());
   REQUIRE(loose->lines.size() == 3);
   for (int s = 0; s < 3; ++s) CHECK(loose->lines[s].joints[0].next == s);
-  // The other way round, and numbered from the other side: the first pair that is near enough is not the
-  // nearest.
+  // The other way round, and numbered from the other side: the first pair that is near enough is
+  // not the nearest.
   std::vector<StripesOfShot> turned{shot(0, 100, 3), shot(101, 200, 3, -9)};
   std::ranges::reverse(turned[1]);
   const auto nearest = join_stripes(turned, {.most_gap_mm = 12});
