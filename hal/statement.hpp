@@ -3,8 +3,7 @@
 //
 // Thread       that of its database
 // Blocking     step() may write to disk
-// Failure      the first error is kept and returned by step(); a statement that could not be prepared fails
-// at step()
+// Failure      the first error is kept and returned by step(), also that of preparing the statement
 #pragma once
 
 #include <sqlite3.h>

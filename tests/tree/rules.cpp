@@ -208,6 +208,9 @@ Findings file_findings(std::string_view path, std::string_view text) {
   append(all, pragma_findings(path, text));
   append(all, name_findings(path));
   append(all, test_name_findings(path, text));
+  append(all, include_order_findings(path, text));
+  append(all, comment_findings(path, text));
+  append(all, function_findings(path, text));
   return all;
 }
 

@@ -19,6 +19,9 @@ Findings width_findings(std::string_view path, std::string_view text);
 Findings pragma_findings(std::string_view path, std::string_view text);
 Findings name_findings(std::string_view path);
 Findings test_name_findings(std::string_view path, std::string_view text);
+Findings include_order_findings(std::string_view path, std::string_view text);  // style_rules.cpp
+Findings comment_findings(std::string_view path, std::string_view text);
+Findings function_findings(std::string_view path, std::string_view text);
 
 // ---- the tree; paths of all files, relative to its top
 Findings top_level_findings(std::span<const std::string> paths);

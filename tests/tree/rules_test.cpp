@@ -199,3 +199,55 @@ TEST_CASE("comments and literals are told from code, also where they look like e
   CHECK(code_only("R\"x(a)\" // )x\" b") == std::string(15, ' ') + "b");
   CHECK(code_only("\"a\\\"b\" c") == "\"    \" c");
 }
+
+TEST_CASE("includes stand in order: own, ours, libraries, system and standard") {
+  const std::string own = include("hal/a.hpp"), ours = include("hal/b.hpp");
+  const std::string fmt = library("fmt/format.h"), standard = library("vector"), system = library("unistd.h");
+  const auto found = [](const std::string& text) {
+    return breaks(include_order_findings("hal/a.cpp", text));
+  };
+  CHECK_FALSE(found(own + "\n" + ours + "\n" + fmt + "\n" + standard + system));
+  CHECK_FALSE(found(own + ours + system + standard));  // those two stand in one block
+  CHECK(found(ours + own));
+  CHECK(found(own + fmt + ours));
+  CHECK(found(own + standard + fmt));
+  CHECK(found(own + system + "\n" + library("sqlite3.h")));
+  CHECK(found(standard + "// why\n" + ours));
+  CHECK_FALSE(found(standard + "#define THE_ORDER_MATTERS\n" + ours));
+  CHECK_FALSE(breaks(include_order_findings("tests/hal/a_test.cpp", own + ours)));
+  CHECK(breaks(include_order_findings("tests/hal/a_test.cpp", ours + own)));
+  CHECK(include_order_findings("hal/c.cpp", standard + "\n" + ours)
+            .front()
+            .starts_with("hal/c.cpp:3: hal/b.hpp"));
+}
+
+TEST_CASE("a word that re-wrapping has left on a line of its own is found") {
+  const auto found = [](const std::string& text) { return breaks(comment_findings("hal/a.hpp", text)); };
+  CHECK(found("// A comment of several words that goes on and\n// on.\n"));
+  CHECK(found("  // set in, it goes\n  // on here.\nint a;\n"));
+  CHECK(found("// Thread       one that is\n//              ordinary\n"));
+  CHECK_FALSE(found("// A comment of several words that goes on\n// and on and on.\n"));
+  CHECK_FALSE(found("// Short.\n"));
+  CHECK_FALSE(found("int a;\n// Short.\nint b;\n"));
+  CHECK_FALSE(found("// A paragraph of its own.\n//\n// Another.\n"));
+  CHECK_FALSE(found("// Thread       any\n// Allocation   none\n"));
+  CHECK_FALSE(found("// What it is called:\n//     moldloft run\n"));
+}
+
+TEST_CASE("a function of more than 70 lines is found, and one on the list that has become shorter") {
+  const auto function = [](const std::string& head, std::size_t count) {
+    std::string text = head + " {\n";
+    for (std::size_t i = 0; i + 2 < count; ++i) text += "  a();\n";
+    return text + "}\n";
+  };
+  CHECK_FALSE(breaks(function_findings("hal/a.cpp", function("void A::b(int c)", 70))));
+  CHECK(function_findings("hal/a.cpp", "int x;\n\n" + function("void A::b(int c)", 71)) ==
+        Findings{"hal/a.cpp:3: A::b has 71 lines, 70 is the most"});
+  CHECK(breaks(function_findings("hal/a.cpp", function("void b(int c,\n       int d)", 71))));
+  CHECK_FALSE(breaks(function_findings("hal/a.cpp", function("struct S", 90))));
+  CHECK_FALSE(breaks(function_findings("hal/a.cpp", "namespace a {\n" + lines(90) + "}\n")));
+  CHECK_FALSE(breaks(function_findings("tests/hal/a.cpp", function("void b()", 71))));
+  CHECK_FALSE(
+      breaks(function_findings("geometry/error.cpp", function("string_view to_string(Error e)", 71))));
+  CHECK(breaks(function_findings("geometry/error.cpp", function("string_view to_string(Error e)", 20))));
+}
