@@ -1,18 +1,19 @@
 // moldloft-sim: the simulated cell as a program.
-#include "firmware_like/build_info.hpp"
-#include "firmware_like/command_line.hpp"
-#include "firmware_like/console.hpp"
-#include "firmware_like/display.hpp"
-#include "firmware_like/option_values.hpp"
-#include "firmware_like/plate_name.hpp"
-#include "firmware_like/run_command.hpp"
-#include "hal/printable_text.hpp"
-#include "host_sim/campaign.hpp"
-#include "host_sim/cell_options.hpp"
-#include "host_sim/day.hpp"
-#include "host_sim/device_host.hpp"
-#include "host_sim/judge.hpp"
-#include "host_sim/simulated_run.hpp"
+#include "firmware_like/commands/command_line.hpp"
+#include "firmware_like/commands/option_values.hpp"
+#include "firmware_like/config/plate_name.hpp"
+#include "firmware_like/gateway/display.hpp"
+#include "firmware_like/process/build_info.hpp"
+#include "firmware_like/process/complaint.hpp"
+#include "firmware_like/process/console.hpp"
+#include "firmware_like/report/result_table.hpp"
+#include "hal/base/printable_text.hpp"
+#include "host_sim/cell/cell_options.hpp"
+#include "host_sim/runs/campaign.hpp"
+#include "host_sim/runs/day.hpp"
+#include "host_sim/runs/device_host.hpp"
+#include "host_sim/runs/judge.hpp"
+#include "host_sim/runs/simulated_run.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -72,12 +73,11 @@ int cell_command(SimulatedRunOptions& options, bool quiet) {
     return 1;
   }
   if (run->exit_code != 0) {
-    say(fmt::format("moldloft-sim cell: {}: {}\n", run->summary["result"].get<std::string>(),
-                    run->summary["message"].get<std::string>()));
+    say(fmt::format("moldloft-sim cell: {}: {}\n", to_string(run->result.outcome), run->result.message));
     return run->exit_code;
   }
   show(quiet ? fmt::format("complete: {}\n", run->folder.string())
-             : result_table(run->summary, run->folder.string()));
+             : result_table(run->result, run->folder.string()));
   return 0;
 }
 

@@ -36,7 +36,7 @@ if(git)
 endif()
 
 set(text "// Written by toolchain/build_info.cmake.
-#include \"firmware_like/build_info.hpp\"
+#include \"firmware_like/process/build_info.hpp\"
 
 namespace moldloft::firmware_like {
 

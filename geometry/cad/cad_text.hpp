@@ -13,8 +13,8 @@ namespace moldloft::geometry {
 std::string step_real(double);  // "0.", "-12.5", "1.E-05": always with a point
 std::string iges_real(double);  // the same with D for the exponent: a double-precision constant
 
-// In quotes; ' and \ doubled, what is not printable ASCII as \X2\....\X0\ or \X4\........\X0\
-// (ISO 10303-21, 6.4.3).
+// In quotes; ' and \ doubled; what is not printable ASCII stands as \X2\....\X0\ or as
+// \X4\........\X0\ (ISO 10303-21, 6.4.3).
 std::string step_string(std::string_view utf8);
 // Hollerith: "5HPlate"; empty text is an empty field, what is not printable ASCII is '?'.
 std::string iges_string(std::string_view utf8);

@@ -4,8 +4,8 @@
 
 #include "bench/benchmark.hpp"
 #include "bench/stopwatch.hpp"
-#include "geometry/fit/parameter_correction.hpp"
 #include "geometry/inspection/isolines.hpp"
+#include "geometry/stripes/parameter_correction.hpp"
 
 #include <fmt/core.h>
 

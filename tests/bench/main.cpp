@@ -1,7 +1,7 @@
 // moldloft-bench NAME: speeds side by side with peers and limits, in one run. Not a test: nothing here passes
 // or fails, and nothing in continuous integration depends on it.
 #include "bench/benchmark.hpp"
-#include "firmware_like/build_info.hpp"
+#include "firmware_like/process/build_info.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>

@@ -1,5 +1,5 @@
 // moldloft-bench scheduler: what a tick costs beside its tasks, next to one read of the clock in the same run.
-#include "tasks/scheduler.hpp"
+#include "tasks/scheduler/scheduler.hpp"
 
 #include "bench/benchmark.hpp"
 #include "bench/stopwatch.hpp"

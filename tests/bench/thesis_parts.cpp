@@ -1,7 +1,7 @@
 #include "bench/thesis_parts.hpp"
 
-#include "geometry/splines/coons_patch.hpp"
 #include "geometry/splines/derived_curves.hpp"
+#include "geometry/stripes/coons_patch.hpp"
 
 #include <fmt/core.h>
 

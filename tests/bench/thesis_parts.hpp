@@ -3,9 +3,9 @@
 #pragma once
 
 #include "bench/benchmark.hpp"
-#include "geometry/fit/bspline_surface_fit.hpp"
-#include "geometry/fit/stripe_curve.hpp"
 #include "geometry/splines/bspline.hpp"
+#include "geometry/stripes/bspline_surface_fit.hpp"
+#include "geometry/stripes/stripe_curve.hpp"
 
 #include <Eigen/Core>
 

@@ -3,7 +3,7 @@
 #include "bench/thesis.hpp"
 #include "bench/thesis_simulated_plate.hpp"
 #include "geometry/fit/plan_map.hpp"
-#include "geometry/splines/coons_patch.hpp"
+#include "geometry/stripes/coons_patch.hpp"
 
 #include <fmt/core.h>
 

@@ -3,9 +3,9 @@
 #include "bench/stopwatch.hpp"
 #include "bench/thesis.hpp"
 #include "bench/thesis_simulated_plate.hpp"
-#include "geometry/fit/bezier_surface_fit.hpp"
-#include "geometry/fit/stripe_matching.hpp"
 #include "geometry/splines/bernstein_form.hpp"
+#include "geometry/stripes/bezier_surface_fit.hpp"
+#include "geometry/stripes/stripe_matching.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>

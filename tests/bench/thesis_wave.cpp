@@ -1,8 +1,8 @@
 // Section 6.2.1, the wave-like surface: how the stripes are parametrized decides, not the algebra.
 #include "bench/thesis.hpp"
 #include "bench/thesis_parts.hpp"
-#include "geometry/fit/parameter_correction.hpp"
 #include "geometry/fit/plan_map.hpp"
+#include "geometry/stripes/parameter_correction.hpp"
 
 #include <fmt/core.h>
 

@@ -1,6 +1,6 @@
 // Sets the process up as far as it may, then asks for memory and threads as a program does later on, and says
 // what it got.
-#include "firmware_like/process_setup.hpp"
+#include "firmware_like/realtime/process_setup.hpp"
 
 #include <fmt/format.h>
 

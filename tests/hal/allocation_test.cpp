@@ -1,14 +1,14 @@
 // The control thread's promise: after construction, receive, transmit, trigger, move and record touch the
 // heap not once.
-#include "hal/cable.hpp"
-#include "hal/line_robot.hpp"
+#include "hal/links/cable.hpp"
+#include "hal/links/tcp_link.hpp"
 #include "hal/loopback_server.hpp"
-#include "hal/psc_scanner.hpp"
-#include "hal/recorder.hpp"
+#include "hal/record/recorder.hpp"
+#include "hal/record/tapped_link.hpp"
+#include "hal/robot/line_robot.hpp"
 #include "hal/robot_peer.hpp"
+#include "hal/scanner/psc_scanner.hpp"
 #include "hal/scanner_peer.hpp"
-#include "hal/tapped_link.hpp"
-#include "hal/tcp_link.hpp"
 
 #include <doctest/doctest.h>
 

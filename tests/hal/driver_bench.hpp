@@ -1,7 +1,7 @@
 // A driver on a cable with its peer at the other end, in ticks of 1 ms of virtual time, and all that it has reported.
 #pragma once
 
-#include "hal/cable.hpp"
+#include "hal/links/cable.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,6 +1,6 @@
 // PROTOCOLS.md against the code: every vector on that page decodes, and encodes again to the same bytes.
-#include "hal/psc1.hpp"
-#include "hal/robot_line.hpp"
+#include "hal/robot/robot_line.hpp"
+#include "hal/scanner/psc1.hpp"
 
 #include <doctest/doctest.h>
 

@@ -2,9 +2,9 @@
 // be read at a glance, with hooks to damage what it says. It counts what really moves.
 #pragma once
 
-#include "hal/byte_link.hpp"
-#include "hal/clock.hpp"
-#include "hal/robot_line.hpp"
+#include "hal/base/clock.hpp"
+#include "hal/links/byte_link.hpp"
+#include "hal/robot/robot_line.hpp"
 
 #include <algorithm>
 #include <functional>

@@ -1,7 +1,7 @@
 // A frame whose numbers are known: what the suites of codec, driver and store send around.
 #pragma once
 
-#include "hal/frame.hpp"
+#include "hal/scanner/frame.hpp"
 
 #include <cmath>
 

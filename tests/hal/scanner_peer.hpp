@@ -2,10 +2,10 @@
 // damage what it sends. It counts what is really exposed.
 #pragma once
 
-#include "hal/byte_link.hpp"
-#include "hal/clock.hpp"
-#include "hal/psc1.hpp"
+#include "hal/base/clock.hpp"
+#include "hal/links/byte_link.hpp"
 #include "hal/sample_frame.hpp"
+#include "hal/scanner/psc1.hpp"
 
 #include <deque>
 #include <functional>

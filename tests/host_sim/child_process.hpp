@@ -2,7 +2,7 @@
 // and it never outlives the test.
 #pragma once
 
-#include "hal/clock.hpp"
+#include "hal/base/clock.hpp"
 #include "hal/temporary_folder.hpp"
 
 #include <optional>

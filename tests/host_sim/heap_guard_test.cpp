@@ -3,12 +3,12 @@
 // count, nor does the drain of the recorder, which is another thread's on a real cell.
 #include "host_sim/heap_guard.hpp"
 
-#include "firmware_like/controller.hpp"
-#include "firmware_like/run_folder.hpp"
-#include "hal/cable.hpp"
+#include "firmware_like/controller/controller.hpp"
+#include "firmware_like/run/run_folder.hpp"
+#include "hal/links/cable.hpp"
 #include "hal/temporary_folder.hpp"
-#include "host_sim/cell_config.hpp"
-#include "host_sim/world.hpp"
+#include "host_sim/cell/cell_config.hpp"
+#include "host_sim/cell/world.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,7 +1,7 @@
 // A server's end of a link whose client comes between two looks, after as many of them as one likes.
 #pragma once
 
-#include "hal/byte_link.hpp"
+#include "hal/links/byte_link.hpp"
 
 namespace moldloft::host_sim {
 

@@ -3,10 +3,11 @@
 // shot and no record is lost.
 #pragma once
 
+#include "hal/record/run_store.hpp"
 #include "hal/temporary_folder.hpp"
-#include "host_sim/cell_config.hpp"
+#include "host_sim/cell/cell_config.hpp"
 #include "host_sim/child_process.hpp"
-#include "host_sim/simulated_run.hpp"
+#include "host_sim/runs/simulated_run.hpp"
 
 #include <doctest/doctest.h>
 

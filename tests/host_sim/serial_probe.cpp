@@ -4,9 +4,9 @@
 //
 // With a second argument it says one byte and listens until the far end is gone: exit code 0 when a
 // silent line was open and the line without a far end is lost.
-#include "hal/clock.hpp"
-#include "hal/robot_line.hpp"
-#include "hal/serial_link.hpp"
+#include "hal/base/clock.hpp"
+#include "hal/links/serial_link.hpp"
+#include "hal/robot/robot_line.hpp"
 
 #include <cstdio>
 #include <string>

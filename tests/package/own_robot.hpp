@@ -1,6 +1,6 @@
 // A robot driver of one's own: what it takes to drive another make of arm, small enough to read in one sitting.
 //
-// The arm of this example speaks lines over any byte link, millimetres and degrees, poses as in hal/pose.hpp:
+// The arm of this example speaks lines over any byte link, millimetres and degrees, poses as in hal/robot/pose.hpp:
 //
 //     ?                                -> P X Y Z YAW PITCH ROLL     where it stands; answered at any time
 //     M X Y Z YAW PITCH ROLL SPEED     -> A, and when it stands again D X Y Z YAW PITCH ROLL, or E CODE
@@ -16,9 +16,9 @@
 //              none of the above is dropped, and the time-out that follows says so
 #pragma once
 
-#include "hal/byte_link.hpp"
-#include "hal/event_queue.hpp"
-#include "hal/robot.hpp"
+#include "hal/base/event_queue.hpp"
+#include "hal/links/byte_link.hpp"
+#include "hal/robot/robot.hpp"
 
 namespace own {
 

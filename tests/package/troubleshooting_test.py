@@ -8,9 +8,9 @@ import sys
 
 tree = pathlib.Path(sys.argv[1])
 # Where a hold, an abort or a lost device gets its words.
-speakers = ["tasks/boundary_tracker.cpp", "tasks/cell.cpp", "tasks/cell_phases.cpp", "tasks/cell_shots.cpp",
-            "tasks/motion_guard.cpp", "tasks/surface_task.cpp", "firmware_like/controller.cpp", "hal/line_robot.cpp",
-            "hal/psc_scanner.cpp", "hal/recorder.cpp", "hal/serial_link.cpp", "hal/tcp_link.cpp"]
+speakers = ["tasks/machines/boundary_tracker.cpp", "tasks/cell/cell.cpp", "tasks/cell/cell_phases.cpp", "tasks/cell/cell_shots.cpp",
+            "tasks/cell/motion_guard.cpp", "tasks/slices/surface_task.cpp", "firmware_like/controller/controller.cpp", "hal/robot/line_robot.cpp",
+            "hal/scanner/psc_scanner.cpp", "hal/record/recorder.cpp", "hal/links/serial_link.cpp", "hal/links/tcp_link.cpp"]
 
 
 def plain(text):

@@ -1,6 +1,6 @@
 // The deployed program under the preloaded guard, over a complete run on a TCP socket and a serial port: the control
 // thread neither allocates, nor locks, nor waits, drivers and fit included.
-#include "firmware_like/run_command.hpp"
+#include "firmware_like/process/complaint.hpp"
 #include "host_sim/real_devices.hpp"
 #include "realtime/guarded_run.hpp"
 

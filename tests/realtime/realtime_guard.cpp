@@ -1,5 +1,5 @@
 // Preloaded into the deployed `moldloft run`: counts what the control thread calls inside its real-time section
-// (hal/realtime_section.hpp) although it promised not to: the heap, locks, sleeps, descriptors that wait, files,
+// (hal/base/realtime_section.hpp) although it promised not to: the heap, locks, sleeps, descriptors that wait, files,
 // threads. Belongs to the tests and is never installed.
 //
 //     LD_PRELOAD=librealtime_guard.so MOLDLOFT_GUARD_REPORT=report.json moldloft run cell.toml

@@ -1,9 +1,9 @@
 // Breaks the promise of a real-time section on purpose, in the way that its argument names, so that tests can see each
 // guard fail. `all` does everything that the preloaded guard knows, each thing at least once; `allowed` what the
 // control thread may do; `outside` everything, but beside the section.
-#include "hal/clock.hpp"
-#include "hal/realtime.hpp"
-#include "hal/realtime_section.hpp"
+#include "hal/base/clock.hpp"
+#include "hal/base/realtime.hpp"
+#include "hal/base/realtime_section.hpp"
 
 #include <array>
 #include <atomic>

@@ -1,9 +1,9 @@
 // A flat plate on a table, seen without noise by a level scanner: enough world to drive the tracker.
 #pragma once
 
-#include "hal/frame.hpp"
-#include "tasks/boundary_tracker.hpp"
-#include "tasks/shot_view.hpp"
+#include "hal/scanner/frame.hpp"
+#include "tasks/machines/boundary_tracker.hpp"
+#include "tasks/slices/shot_view.hpp"
 
 #include <array>
 #include <cmath>

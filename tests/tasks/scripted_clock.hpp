@@ -1,7 +1,7 @@
 // A clock that moves only when a task says what it costs, and tasks that follow a script of costs.
 #pragma once
 
-#include "tasks/scheduler.hpp"
+#include "tasks/scheduler/scheduler.hpp"
 
 #include <vector>
 

@@ -35,11 +35,11 @@ const std::vector<std::string_view> rooms_and_tests = {"geometry/",      "hal/",
 const std::vector<Ban> bans = {
     {R"(\b(sleep_for|usleep|nanosleep|clock_nanosleep|sleep)\s*\(|\bthis_thread::sleep_until\b)",
      rooms_and_tests,
-     {"hal/clock.", "tests/realtime/realtime_"},  // which count those who do it all the same
+     {"hal/base/clock.", "tests/realtime/realtime_"},  // which count those who do it all the same
      "waiting is done by hal::Clock::sleep_until alone"},
     {R"(\b(steady_clock|system_clock|high_resolution_clock)::now\b|\bclock_gettime\b|\bgettimeofday\b)",
      rooms,
-     {"hal/clock."},
+     {"hal/base/clock."},
      "time is read through hal::Clock"},
     {R"(\bstd::j?thread\b|\bpthread_create\b|\bstd::async\b)",
      {"geometry/", "hal/", "tasks/"},
@@ -48,7 +48,7 @@ const std::vector<Ban> bans = {
     {R"(\bstd::function\b)", {"hal/", "tasks/"}, {}, "a template or a pointer: std::function may allocate"},
     {R"(\.dump\(\d*\)|->dump\(\d*\))",
      {"firmware_like/", "host_sim/"},
-     {"firmware_like/json_text."},
+     {"firmware_like/process/json_text."},
      "json_text(): dump() throws where a string is no UTF-8"},
     {R"(\bstd::(cout|cerr|clog|cin)\b)", rooms, {}, "fmt::print in the programs, a value elsewhere"},
 };

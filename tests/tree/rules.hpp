@@ -33,6 +33,7 @@ Findings tree_findings(std::span<const std::string> paths);            // all ru
 bool is_source(std::string_view path);  // .hpp, .cpp, .c
 bool is_header(std::string_view path);
 bool is_room(std::string_view name);
-std::string_view first_folder(std::string_view path);  // "hal/clock.hpp": hal; empty for a file at the top
+std::string_view first_folder(
+    std::string_view path);  // "hal/base/clock.hpp": hal; empty for a file at the top
 
 }  // namespace moldloft::tree

@@ -37,21 +37,21 @@ TEST_CASE("an include against an arrow is found, one along it is not") {
 }
 
 TEST_CASE("an include is found however it is written, and not where it is only talked about") {
-  CHECK(breaks(include_findings("hal/a.hpp", "#include <tasks/cell.hpp>\n")));
-  CHECK(breaks(include_findings("hal/a.hpp", "  #  include\t\"tasks/cell.hpp\" // why\n")));
+  CHECK(breaks(include_findings("hal/a.hpp", "#include <tasks/cell/cell.hpp>\n")));
+  CHECK(breaks(include_findings("hal/a.hpp", "  #  include\t\"tasks/cell/cell.hpp\" // why\n")));
   CHECK(breaks(include_findings("hal/a.hpp", include("clock.hpp"))));  // without the room's name
-  CHECK_FALSE(breaks(include_findings("hal/a.hpp", "// #include \"tasks/cell.hpp\"\n")));
-  CHECK_FALSE(breaks(include_findings("hal/a.hpp", "/*\n#include \"tasks/cell.hpp\"\n*/\n")));
-  CHECK(include_findings("hal/a.hpp", "\n\n" + include("tasks/cell.hpp")) ==
-        Findings{"hal/a.hpp:3: includes tasks/cell.hpp against the arrows"});
+  CHECK_FALSE(breaks(include_findings("hal/a.hpp", "// #include \"tasks/cell/cell.hpp\"\n")));
+  CHECK_FALSE(breaks(include_findings("hal/a.hpp", "/*\n#include \"tasks/cell/cell.hpp\"\n*/\n")));
+  CHECK(include_findings("hal/a.hpp", "\n\n" + include("tasks/cell/cell.hpp")) ==
+        Findings{"hal/a.hpp:3: includes tasks/cell/cell.hpp against the arrows"});
 }
 
 TEST_CASE("a room's tests see what the room sees") {
-  CHECK(breaks(include_findings("tests/geometry/a.cpp", include("hal/clock.hpp"))));
-  CHECK(breaks(include_findings("tests/tasks/a.cpp", include("host_sim/world.hpp"))));
+  CHECK(breaks(include_findings("tests/geometry/a.cpp", include("hal/base/clock.hpp"))));
+  CHECK(breaks(include_findings("tests/tasks/a.cpp", include("host_sim/cell/world.hpp"))));
   CHECK_FALSE(breaks(include_findings("tests/tasks/a.cpp", include("tasks/scripted_clock.hpp"))));
-  CHECK_FALSE(
-      breaks(include_findings("tests/tasks/a.cpp", include("hal/clock.hpp") + library("doctest/doctest.h"))));
+  CHECK_FALSE(breaks(
+      include_findings("tests/tasks/a.cpp", include("hal/base/clock.hpp") + library("doctest/doctest.h"))));
 }
 
 TEST_CASE("geometry knows Eigen and the standard library only") {
@@ -93,16 +93,16 @@ TEST_CASE("a sleep is found anywhere, waiting by the clock is not") {
   }
   CHECK_FALSE(breaks(banned_findings("tasks/a.cpp", "clock_.sleep_until(t);")));
   CHECK_FALSE(breaks(banned_findings("tests/tasks/a.hpp", "void sleep_until(Instant wake) override {}")));
-  CHECK_FALSE(breaks(banned_findings("hal/clock.cpp", "clock_nanosleep(a, b, c, d);")));
+  CHECK_FALSE(breaks(banned_findings("hal/base/clock.cpp", "clock_nanosleep(a, b, c, d);")));
   CHECK_FALSE(breaks(banned_findings("tasks/a.cpp", "// never usleep(1)\nauto s = \"usleep(1)\";")));
 }
 
-TEST_CASE("reading time outside hal/clock.cpp is found, while a test may measure") {
+TEST_CASE("reading time outside hal/base/clock.cpp is found, while a test may measure") {
   CHECK(breaks(banned_findings("tasks/a.cpp", "auto t = std::chrono::steady_clock::now();")));
-  CHECK(breaks(banned_findings("hal/tcp_link.cpp", "clock_gettime(CLOCK_MONOTONIC, &t);")));
+  CHECK(breaks(banned_findings("hal/links/tcp_link.cpp", "clock_gettime(CLOCK_MONOTONIC, &t);")));
   CHECK(breaks(banned_findings("host_sim/a.hpp",
                                "using C = std::chrono::system_clock; auto t = system_clock::now();")));
-  CHECK_FALSE(breaks(banned_findings("hal/clock.cpp", "clock_gettime(CLOCK_MONOTONIC, &t);")));
+  CHECK_FALSE(breaks(banned_findings("hal/base/clock.cpp", "clock_gettime(CLOCK_MONOTONIC, &t);")));
   CHECK_FALSE(breaks(banned_findings("tests/geometry/a.cpp", "auto t = std::chrono::steady_clock::now();")));
 }
 
@@ -165,7 +165,7 @@ TEST_CASE("names that say nothing are found, as rooms, as files and as parts of 
     CAPTURE(path);
     CHECK(breaks(name_findings(path)));
   }
-  CHECK_FALSE(breaks(name_findings("hal/clock.hpp")));
+  CHECK_FALSE(breaks(name_findings("hal/base/clock.hpp")));
   CHECK_FALSE(breaks(name_findings("geometry/utilization.hpp")));
 }
 
@@ -177,17 +177,19 @@ TEST_CASE("a semicolon in a test's name is found, also where the name goes over 
 }
 
 TEST_CASE("a folder that the design does not know is found at the top") {
-  const std::vector<std::string> good = {"README.md", "hal/clock.hpp",    ".ci/run",
-                                         "build/a",   "out/run-1/run.db", ".git"};
+  const std::vector<std::string> good = {"README.md", "hal/base/clock.hpp", ".ci/run",
+                                         "build/a",   "out/run-1/run.db",   ".git"};
   CHECK_FALSE(breaks(top_level_findings(good)));
-  const std::vector<std::string> bad = {"hal/clock.hpp", "docs/index.md", "docs/more.md", "src/main.cpp"};
+  const std::vector<std::string> bad = {"hal/base/clock.hpp", "docs/index.md", "docs/more.md",
+                                        "src/main.cpp"};
   CHECK(top_level_findings(bad).size() == 2);
 }
 
 TEST_CASE("a folder without its page is found, and so is a tree without one") {
-  const std::vector<std::string> good = {"README.md", "hal/README.md", "hal/clock.hpp", ".ci/run", "build/x"};
+  const std::vector<std::string> good = {"README.md", "hal/README.md", "hal/base/clock.hpp", ".ci/run",
+                                         "build/x"};
   CHECK_FALSE(breaks(readme_findings(good)));
-  const std::vector<std::string> bad = {"hal/clock.hpp", "tests/hal/README.md"};
+  const std::vector<std::string> bad = {"hal/base/clock.hpp", "tests/hal/README.md"};
   CHECK(readme_findings(bad) == Findings{"/: a README.md of a page is missing",
                                          "hal/: a README.md of a page is missing",
                                          "tests/: a README.md of a page is missing"});

@@ -98,8 +98,8 @@ Findings comment_findings(std::string_view path, std::string_view text) {
     const auto comment = comment_in(line);
     const bool goes_on =
         !before.empty() && words_in(before) > 0 && indent_of(comment) <= indent_of(before) + 14;
-    // Text that is set in by more than a blank under a line that is not, is an example.
-    const bool example = indent_of(comment) >= 4 && indent_of(before) < 4 && !begins_an_entry(before);
+    // Text that is set in by more than a blank, but not as far as an entry's, is an example.
+    const bool example = indent_of(comment) >= 4 && indent_of(comment) < 10;
     if (goes_on && !example && !begins_an_entry(comment) && words_in(comment) > 0 && words_in(comment) <= 2)
       findings.push_back(at_line(path, number) + "'" + std::string{comment.substr(indent_of(comment))} +
                          "' is left over from re-wrapping: wrap the paragraph narrower");

@@ -1,6 +1,7 @@
 // The tree as it lies on the disk keeps its rules.
 #include "tree/rules.hpp"
 #include "tree/source_text.hpp"
+#include "tree/wing_rules.hpp"
 
 #include <doctest/doctest.h>
 
@@ -47,6 +48,20 @@ TEST_CASE("folders at the top are those of the design, each with its page") {
 
 TEST_CASE("every file keeps the arrows, the measures, the names and its place for time, threads and sleep") {
   for (const auto& path : files_of_the_tree()) report(file_findings(path, text_of(path)));
+}
+
+TEST_CASE(
+    "wings keep their arrows, stand in no circle and on few floors, and no folder grows beyond a screen") {
+  const auto paths = files_of_the_tree();
+  std::vector<Wing> wings;
+  for (const char* room : {"geometry", "hal", "tasks", "firmware_like", "host_sim"}) {
+    const auto of_the_room = wings_in(text_of(std::string{room} + "/CMakeLists.txt"));
+    CHECK_MESSAGE(of_the_room.size() >= 5, room);  // the lines are really read
+    wings.insert(wings.end(), of_the_room.begin(), of_the_room.end());
+  }
+  report(wing_order_findings(wings));
+  report(wing_content_findings(paths, wings));
+  for (const auto& path : paths) report(wing_include_findings(path, text_of(path), wings));
 }
 
 TEST_CASE("the search really reads the tree: all rooms, their sources, and includes along every arrow") {

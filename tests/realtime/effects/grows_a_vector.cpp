@@ -1,6 +1,6 @@
 // Must not compile: a background task that grows a vector in its step.
-#include "hal/realtime.hpp"
-#include "tasks/scheduler.hpp"
+#include "hal/base/realtime.hpp"
+#include "tasks/scheduler/scheduler.hpp"
 
 #include <vector>
 

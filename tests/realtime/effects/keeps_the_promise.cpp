@@ -1,6 +1,6 @@
 // Must compile: a background task that works in memory that it has.
-#include "hal/realtime.hpp"
-#include "tasks/scheduler.hpp"
+#include "hal/base/realtime.hpp"
+#include "tasks/scheduler/scheduler.hpp"
 
 #include <vector>
 

@@ -1,6 +1,6 @@
 // Must not compile: the promise covers what a task calls, however deep. Here it sleeps two calls down.
-#include "hal/clock.hpp"
-#include "tasks/scheduler.hpp"
+#include "hal/base/clock.hpp"
+#include "tasks/scheduler/scheduler.hpp"
 
 namespace {
 

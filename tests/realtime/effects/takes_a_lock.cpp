@@ -1,6 +1,6 @@
 // Must not compile: a task that takes a lock.
-#include "hal/realtime.hpp"
-#include "tasks/scheduler.hpp"
+#include "hal/base/realtime.hpp"
+#include "tasks/scheduler/scheduler.hpp"
 
 #include <mutex>
 

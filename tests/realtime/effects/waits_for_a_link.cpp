@@ -1,5 +1,5 @@
 // Must not compile: a byte link that reads a descriptor without a word on why it comes back at once.
-#include "hal/byte_link.hpp"
+#include "hal/links/byte_link.hpp"
 
 #include <unistd.h>
 

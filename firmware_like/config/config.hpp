@@ -1,0 +1,92 @@
+// The cell's configuration: one TOML file a cell, every key explained in cell.example.toml beside this file.
+//
+// Strict on purpose: an unknown key, a wrong type, an impossible value or a contradiction is one line with file, line,
+// key and what is allowed, because a misspelt limit that silently keeps its default is how arms meet plates.
+#pragma once
+
+#include "firmware_like/config/config_rules.hpp"
+#include "firmware_like/config/realtime_config.hpp"
+#include "hal/scanner/psc1.hpp"
+#include "tasks/cell/cell.hpp"
+
+#include <expected>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace moldloft::firmware_like {
+
+struct ConfigError {
+  std::string what;  // "cell.toml:12: [robot] baud: ...", a line for each error
+};
+
+struct ScannerConfig {
+  std::string driver = "psc1";
+  std::string host = "127.0.0.1";
+  int port = hal::psc1::default_port;
+  hal::psc1::Encoding encoding = hal::psc1::Encoding::int16;
+  int max_stripes = 100;
+  int max_points_per_stripe = 500;
+  double field_x_mm = 102, field_y_mm = 102;
+  double noise_mm = 0.051;
+  double depth_mm = 60;                    // z is measured within +-this
+  geometry::RigidMotion tip_from_scanner;  // the mount
+};
+
+struct RobotConfig {
+  std::string driver = "line";
+  std::string device = "/dev/ttyS0";
+  int baud = 115200;
+  int speed_percent = 100;
+  double repeatability_z_mm = 0.013;
+  tasks::Workspace workspace;
+  tasks::Arrival arrival;
+};
+
+struct PlateConfig {
+  double table_z_mm = 0;  // what the plate lies on
+  double thickness_mm = 6;
+  double largest_x_mm = 500, largest_y_mm = 500;  // the memory plan is made for this
+};
+
+struct CellConfig {
+  std::string path, text;                // where it came from and as it stood there; kept in the run store
+  std::map<std::string, int> key_lines;  // "robot.baud" -> 12, of the keys that stand there
+  std::string name = "cell";
+  hal::Duration tick = std::chrono::milliseconds{1};
+  tasks::MissedTickPolicy missed_ticks = tasks::MissedTickPolicy::skip_keep_phase;
+  hal::Duration device_timeout = std::chrono::seconds{10};
+  hal::Duration scanner_wait = std::chrono::seconds{300};  // long enough for a scanner to boot, twice
+  ScannerConfig scanner;
+  RobotConfig robot;
+  PlateConfig plate;
+  tasks::ShotPlace start;
+  double tracking_overlap_mm = 45;
+  double tracking_crossing_deg = 45;
+  double seek_step_mm = 70;
+  double seek_limit_mm = 3000;
+  double scan_overlap_mm = 10;
+  double scan_margin_mm = 2;
+  double finest_span_mm = 10;  // of the surface's net
+  double fit_tolerance_mm = 0.005;
+  RealtimeConfig realtime;
+};
+
+CellConfig default_config();
+std::expected<CellConfig, ConfigError> load_config(const std::string& path);
+
+// All that is wrong with a text and all that looks wrong, by line. The configuration holds what could be read.
+struct ExaminedConfig {
+  CellConfig config;
+  std::vector<ConfigFinding> findings;
+};
+ExaminedConfig examine_config(const std::string& text, const std::string& path);
+std::expected<std::string, ConfigError> read_config(const std::string& path);  // the file's text
+std::expected<CellConfig, ConfigError> parse_config(const std::string& text, const std::string& path);
+
+// The first key whose value differs between two configurations and would make a run measure differently
+// ("start.yaw_deg"); empty when there is none. Where the devices are found, when the program gets its
+// turn, how much memory is planned for, names and comments make no difference.
+std::string first_difference(const std::string& text, const std::string& other);
+
+}  // namespace moldloft::firmware_like

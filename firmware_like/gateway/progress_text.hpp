@@ -1,0 +1,33 @@
+// What a person is told of a cell at work, as text: the line that renews itself on a terminal, the status for the
+// service manager, what is waited for, and what is noted. Pure functions.
+#pragma once
+
+#include "tasks/cell/cell_progress.hpp"
+#include "tasks/cell/notice.hpp"
+
+#include <cstddef>
+#include <string>
+
+namespace moldloft::firmware_like {
+
+// What the cell itself does not know of what it waits for.
+struct Surroundings {
+  std::string scanner = "its address", robot = "its port";  // "192.168.10.2:4014", "/dev/ttyS0"
+  bool has_operator = false;  // who can send a word: without one none is waited for
+};
+
+// "waiting for the robot at /dev/ttyS0"; empty when nothing is.
+std::string awaited_text(const tasks::CellProgress&, const Surroundings& = {});
+
+// Time, state and phase, shots, what is left, what is waited for.
+std::string progress_line(const tasks::CellProgress&, const Surroundings& = {});
+// The same in so many columns at most: first it says things shorter, then it leaves out what matters least, at last it
+// is cut, never inside a character.
+std::string progress_line_within(std::size_t columns, const tasks::CellProgress&, const Surroundings& = {});
+
+// Without the time that passes, and with what a person has to see to: it changes when something happens.
+std::string status_line(const tasks::CellProgress&, const Surroundings& = {});
+
+std::string notice_line(const tasks::Notice&);
+
+}  // namespace moldloft::firmware_like

@@ -1,0 +1,25 @@
+// How a command ends, and how a refusal is said: one line on standard error, and a code that is not zero.
+//
+// Thread       as say() (console.hpp)
+#pragma once
+
+#include "firmware_like/process/journal.hpp"
+
+#include <string_view>
+
+namespace moldloft::firmware_like {
+
+enum ExitCode : int {
+  exit_done = 0,
+  exit_failed = 1,  // nothing was begun, or a file could not be written
+  exit_held = 2,    // the cell holds for a person
+  exit_aborted = 3,
+  exit_stopped = 4,  // by ctrl-C
+};
+
+// The one line that a failure is; the exit code that goes with it.
+int complain(std::string_view what, std::string_view program = "moldloft", Priority = Priority::error);
+// The same for what has several lines, such as all errors of a configuration; each is made printable.
+int complain_all(std::string_view lines, std::string_view program = "moldloft");
+
+}  // namespace moldloft::firmware_like

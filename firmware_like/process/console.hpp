@@ -1,0 +1,39 @@
+// What a person reads: lines on standard error, a command's answer on standard output. Nobody's reading, or not
+// reading, ends the program or holds it up for long: a journal that has gone, a full disk under the log, a closed
+// terminal, a pipe that nobody empties.
+//
+// Thread       open_console() first of all in main(); say() and unsaid() anywhere but the control thread; the rest on
+//              the first thread
+// Blocking     say() and show_within() up to their limit; show() as long as its reader takes
+// Allocation   none beyond the text that is given
+// Failure      say() counts it; show() keeps it for end_of_output()
+#pragma once
+
+#include "hal/base/clock.hpp"
+
+#include <cstdint>
+#include <string_view>
+
+namespace moldloft::firmware_like {
+
+// Descriptors 0 to 2 are opened on /dev/null where they are closed, so that no run store and no serial port gets one
+// of their numbers and is written to as if it were a terminal. A pipe without a reader and a file beyond its limit
+// are errors of a write from now on, no longer signals that kill.
+void open_console();
+
+// Text for a person on standard error, as it stands. When it cannot be written within a second it is dropped and
+// counted, and until somebody reads again nothing waits any more.
+void say(std::string_view text) noexcept;
+std::uint64_t unsaid() noexcept;  // texts that were not, or not wholly, written
+
+// A command's answer on standard output. Nothing is lost silently: end_of_output() tells.
+void show(std::string_view text) noexcept;
+void flush_shown() noexcept;  // for who watches while it is written
+// The same with a limit, for a program that has to come to its end whoever reads. True when it was written; if not, it
+// is the caller's to tell, and no failure of the command.
+bool show_within(hal::Duration limit, std::string_view text) noexcept;
+
+// The exit code of a command that has shown its answer: 1, and a line that says why, when it could not be written.
+int end_of_output(int exit_code, std::string_view program) noexcept;
+
+}  // namespace moldloft::firmware_like

@@ -1,0 +1,12 @@
+// Why something could not be done, for a person: one line that says what, where, and what to do.
+#pragma once
+
+#include <string>
+
+namespace moldloft::firmware_like {
+
+struct Failure {
+  std::string what;
+};
+
+}  // namespace moldloft::firmware_like

@@ -1,0 +1,20 @@
+// report.html: timing.json as one page to look at and to print. Nothing is loaded from anywhere: the style stands in
+// it, the histograms are inline SVG, and there is no script. It follows the reader's light or dark setting.
+//
+// Thread       any
+// Allocation   yes
+// Failure      throws Json::exception where a report lacks what every report has: one of another version
+#pragma once
+
+#include "firmware_like/process/json_text.hpp"
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace moldloft::firmware_like {
+
+std::string timing_page(const Json& timing, std::string_view title, std::string_view about = "");
+std::string page_title(const std::filesystem::path& folder);  // "Timing of plate-17"
+
+}  // namespace moldloft::firmware_like

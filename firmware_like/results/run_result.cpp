@@ -1,0 +1,34 @@
+#include "firmware_like/results/run_result.hpp"
+
+#include "firmware_like/process/complaint.hpp"
+
+#include <algorithm>
+
+namespace moldloft::firmware_like {
+namespace {
+
+struct OutcomeRow {
+  Outcome outcome;
+  std::string_view word;
+  int exit_code;
+};
+constexpr std::array<OutcomeRow, 4> outcomes{{{Outcome::complete, "complete", exit_done},
+                                              {Outcome::held, "held", exit_held},
+                                              {Outcome::aborted, "aborted", exit_aborted},
+                                              {Outcome::stopped, "stopped", exit_stopped}}};
+
+const OutcomeRow& row_of(Outcome outcome) {
+  return *std::ranges::find(outcomes, outcome, &OutcomeRow::outcome);
+}
+
+}  // namespace
+
+std::string_view to_string(Outcome outcome) { return row_of(outcome).word; }
+int exit_code(Outcome outcome) { return row_of(outcome).exit_code; }
+
+std::optional<Outcome> outcome_named(std::string_view word) {
+  const auto* row = std::ranges::find(outcomes, word, &OutcomeRow::word);
+  return row == outcomes.end() ? std::nullopt : std::optional{row->outcome};
+}
+
+}  // namespace moldloft::firmware_like

@@ -1,0 +1,177 @@
+// The driver of a robot that speaks the numbered lines of PROTOCOLS.md, on any byte link.
+//
+//     link open -> SYN -> STA -> POS -> ready -> MOV or CAL -> ACK -> DON -> ready
+//
+// The way through it is the table in line_robot.cpp. A command has one number for its whole life and is
+// repeated as the same line until its fate is known; a robot that keeps PROTOCOLS.md moves once for a number,
+// however often it comes. What cannot be known that way (robot restarted, link gone for good) is never asked
+// again: the command is given up, and after SYN the cell learns from `ready` where the arm stands.
+//
+// Thread, blocking, allocation, failure: as Robot says
+#pragma once
+
+#include "hal/base/event_queue.hpp"
+#include "hal/links/byte_link.hpp"
+#include "hal/robot/robot.hpp"
+#include "hal/robot/robot_line.hpp"
+
+#include <array>
+#include <cstddef>
+#include <optional>
+
+namespace moldloft::hal {
+
+class LineRobot final : public Robot {
+ public:
+  struct Settings {
+    int baud = 115200;          // of the line, for the time that a line takes on it
+    Duration ping_period = 1s;  // the robot stops after 3 s without a line: two may be lost
+    Duration ack_timeout =
+        500ms;        // for an interpreted program to read, check and answer; line times come on top
+    int resends = 3;  // of a line without an answer, before the robot is asked how it stands
+    Duration silent_limit = 3s;     // the robot's own watchdog; an arm that heard nothing has stopped by then
+    Duration done_timeout = 60s;    // of one command; the longest path at the lowest speed takes less
+    Duration garble_pause = 20ms;   // after a garbled reply, before the same line goes again
+    Duration connect_timeout = 2s;  // where the line is a terminal server's socket
+    Duration first_back_off = 100ms;  // of opening the port again; doubles with each failure
+    Duration last_back_off = 2s;
+    // Of SYN; each time that SYN begins anew counts on. The program gives another one at each start: an answer to an
+    // earlier program must not pass for one to this.
+    std::uint32_t first_nonce = 1;
+  };
+
+  LineRobot(ByteLink&, const Settings&);
+
+  void start(Instant now) override;
+  void receive(Instant now) override;
+  void transmit(Instant now) override;
+  bool move(const Pose& target, int speed_percent, Instant now) override;
+  bool calibrate(Instant now) override;
+  void stop(Instant now) override;
+  void reset(Instant now) override;
+  std::optional<RobotEvent> next_event() override { return events_.pop(); }
+  RobotState state() const override;
+  std::string_view why() const override { return why_; }
+  std::size_t plan_bytes() const override { return sizeof *this; }
+
+  robot_line::Status last_status() const { return status_; }
+  std::uint64_t garbled_lines() const { return garbled_lines_; }    // received, and thrown away
+  std::uint64_t repeated_lines() const { return repeated_lines_; }  // sent again because no answer came
+
+ private:
+  static constexpr std::size_t shown_of_line =
+      40;  // of a line in a message: verb and fields, with room for the reason
+
+  enum class Phase { idle, waiting, opening, syncing, checking, locating, ready, commanded, moving, faulted };
+  enum class Cue {
+    start,
+    wait_over,
+    link_open,
+    link_lost,
+    silent,
+    synced,
+    fit,
+    in_motion,
+    stands_still,
+    located,
+    command,
+    acked,
+    done,
+    error,
+    late,
+    fault,
+    reset
+  };
+  struct Transition;
+  static const Transition transitions[];
+
+  void cue(Cue, Instant now);
+
+  // guards
+  bool always() const MOLDLOFT_NONBLOCKING { return true; }
+  bool has_resends() const MOLDLOFT_NONBLOCKING { return resends_ < settings_.resends; }
+  bool is_latched() const MOLDLOFT_NONBLOCKING { return latched_; }
+  bool is_stopping() const MOLDLOFT_NONBLOCKING { return stop_requested_; }
+  bool has_stopped() const MOLDLOFT_NONBLOCKING { return stop_requested_ && !stop_wanted_; }
+
+  // actions
+  void nothing(Instant) MOLDLOFT_NONBLOCKING {}
+  void open_link(Instant now) MOLDLOFT_NONBLOCKING;
+  void back_off(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_loss(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_silence(Instant now) MOLDLOFT_NONBLOCKING;
+  void start_sync(Instant now) MOLDLOFT_NONBLOCKING;
+  void send_syn(Instant now) MOLDLOFT_NONBLOCKING;
+  void ask_status(Instant now) MOLDLOFT_NONBLOCKING;
+  void send_stop_and_wait(Instant now) MOLDLOFT_NONBLOCKING;
+  void ask_pose(Instant now) MOLDLOFT_NONBLOCKING;
+  void announce(Instant now) MOLDLOFT_NONBLOCKING;
+  void send_command(Instant now) MOLDLOFT_NONBLOCKING;
+  void resend_command(Instant now) MOLDLOFT_NONBLOCKING;
+  void resend_afresh(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_moving(Instant now) MOLDLOFT_NONBLOCKING;
+  void await_done(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_done(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_refused(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_stopped_and_sync(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_fault(Instant now) MOLDLOFT_NONBLOCKING;
+  void unlatch(Instant now) MOLDLOFT_NONBLOCKING;
+
+  // what arrives
+  void take_bytes(std::span<const std::byte> bytes, Instant now);
+  void take_line(std::string_view line, Instant now);
+  void garbled(std::string_view line, robot_line::Flaw, Instant now);
+  void on_answer(const robot_line::Reply&, Instant now);
+  void on_status(const robot_line::Status&, Instant now);
+  void on_numbered(const robot_line::Reply&, Instant now);
+  void on_refusal(const robot_line::Reply&, Instant now);
+  void fault(Instant now, int code, const Message& text);
+
+  std::optional<Message> instead_of_lines() const;
+  void watch(Instant now);
+  bool is_open() const { return phase_ > Phase::opening; }
+  bool has_command() const { return phase_ == Phase::commanded || phase_ == Phase::moving; }
+  bool begin(robot_line::Command command, Instant now);
+  bool ask(robot_line::Verb verb, Instant now);
+  bool send(std::string_view line, Instant now);
+  void flush();
+
+  ByteLink& link_;
+  const Settings settings_;
+  const Duration answer_time_;  // ack_timeout and two of the longest lines
+  EventQueue<RobotEvent, 16> events_;
+
+  Phase phase_ = Phase::idle;
+  bool latched_ = false;         // a fault that no operator has cleared yet
+  bool announced_ = false;       // ready was reported and not taken back by lost
+  bool stop_wanted_ = false;     // STP is not answered yet
+  bool stop_requested_ = false;  // since the command was sent: ERR is then no fault
+  int number_ = 0;               // of the last command
+  std::uint32_t nonce_;
+  robot_line::Line command_;  // as it goes over the wire, each time
+  int resends_ = 0;
+  Instant answer_due_{0};  // of the line that the phase waits on
+  Instant stop_due_{0};
+  Instant done_due_{0};
+  Instant wait_until_{0};
+  Instant heard_at_{0}, sent_at_{0};
+  Duration back_off_{0};
+  robot_line::Status status_;
+  Pose pose_;     // last reported
+  int code_ = 0;  // of the last error or event
+  Message text_;  // what the next event says
+  Message why_ = "not started yet";
+
+  std::array<char, robot_line::max_length> incoming_{};
+  std::size_t incoming_size_ = 0;
+  bool overlong_ = false;                    // the line on its way is too long: nothing of it counts
+  std::uint64_t unread_ = 0;                 // characters since the last line that could be read
+  std::array<char, shown_of_line> shown_{};  // of the last line that could not, its beginning
+  std::size_t shown_size_ = 0;
+  robot_line::Flaw flaw_{};  // of that line
+  std::array<std::byte, 1024> outgoing_{};
+  std::size_t outgoing_size_ = 0;
+  std::uint64_t garbled_lines_ = 0, repeated_lines_ = 0;
+};
+
+}  // namespace moldloft::hal

@@ -1,0 +1,139 @@
+#include "host_sim/runs/simulated_run.hpp"
+
+#include "firmware_like/config/plate_name.hpp"
+#include "firmware_like/controller/result_of.hpp"
+#include "firmware_like/report/result_files.hpp"
+#include "firmware_like/results/summary.hpp"
+#include "hal/links/cable.hpp"
+#include "host_sim/cell/cell_config.hpp"
+#include "host_sim/cell/world_clock.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace moldloft::host_sim {
+namespace {
+
+using firmware_like::Controller;
+using firmware_like::Json;
+
+constexpr int ticks_between_drains = 10;
+constexpr int ticks_between_reports = 200;
+
+Json truth_json(const Verdict& v) {
+  return {{"normal_max_mm", v.normal_max_mm},
+          {"normal_rms_mm", v.normal_rms_mm},
+          {"outline_max_mm", v.outline_max_mm},
+          {"corner_max_mm", v.corner_max_mm},
+          {"points", v.points}};
+}
+
+// The judge's grid lies on the true plate, the picture's cells on the measured surface: each cell shows the grid point
+// nearest to its middle.
+firmware_like::PlateField error_field(const Verdict& verdict, const geometry::BSplineSurface& surface,
+                                      int count) {
+  firmware_like::PlateField field;
+  field.count_u = field.count_v = count;
+  field.title = "Measured minus true surface, along the normal";
+  field.unit = "um";
+  field.scale = 1000;
+  for (int i = 0; i < count; ++i) {
+    for (int k = 0; k < count; ++k) {
+      const Eigen::Vector3d p = surface.at((i + 0.5) / count, (k + 0.5) / count).value;
+      double nearest = INFINITY, value = NAN;
+      for (const auto& d : verdict.grid) {
+        const double distance = (d.world - p.head<2>()).squaredNorm();
+        if (distance >= nearest) continue;
+        nearest = distance;
+        value = d.normal_mm;
+      }
+      field.values.push_back(value);
+    }
+  }
+  return field;
+}
+
+void run_to_rest(Controller& controller, const SimulatedCell& cell, hal::Clock& clock,
+                 const SimulatedRunOptions& options) {
+  controller.start();
+  for (int ticks = 1; controller.tick() && clock.now() < options.time_limit; ++ticks) {
+    if (options.on_tick) options.on_tick(cell, clock.now());
+    if (ticks % ticks_between_drains == 0) controller.recorder().drain(cell.store);
+    if (options.on_progress && ticks % ticks_between_reports == 0)
+      options.on_progress(controller.cell().progress());
+  }
+  controller.recorder().drain(cell.store);
+  if (options.on_progress) options.on_progress(controller.cell().progress());
+}
+
+// "wave, seed 1"; of a mesh the file's name without the path.
+std::string shape_and_seed(const CellDescription& cell) {
+  const bool mesh = cell.plate.ends_with(".ply");
+  return fmt::format("{}, seed {}", mesh ? firmware_like::name_of_folder(cell.plate) : cell.plate, cell.seed);
+}
+
+std::expected<firmware_like::RunFolder, firmware_like::Failure> folder_for(const SimulatedRunOptions& options,
+                                                                           const std::string& text) {
+  firmware_like::RunNames names{options.name, options.remark};
+  if (options.resume) return firmware_like::resume_run(options.out, text, names);
+  if (names.plate.empty()) names.plate = shape_and_seed(options.cell);
+  return firmware_like::create_run(options.out, text, firmware_like::RunKind::simulated, names);
+}
+
+}  // namespace
+
+std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& options) {
+  const auto plate = placed_plate(options.cell);
+  if (!plate) return std::unexpected{plate.error()};
+  if (options.on_plate) options.on_plate(*plate);
+  const std::string text = options.config.empty() ? cell_toml(options.cell, *plate) : options.config;
+  const auto config = firmware_like::parse_config(text, "simulated cell");
+  if (!config) return std::unexpected{SimError{config.error().what}};
+  auto folder = folder_for(options, text);
+  if (!folder) return std::unexpected{SimError{folder.error().what}};
+
+  WorldClock clock;
+  hal::Cable scanner_cable{clock, {}}, robot_cable{clock, {.bytes_per_second = serial_bytes_per_second}};
+  SimulatedWorld world{options.cell, *plate, scanner_cable.device(), robot_cable.device()};
+  clock.carry(world);
+  if (options.real_time) clock.pace_by_wall();
+  const std::uint32_t epoch = options.resume ? folder->archive->last_epoch() + 1 : 1;
+  const auto controller =
+      std::make_unique<Controller>(*config, clock, scanner_cable.host(), robot_cable.host(),
+                                   firmware_like::ControllerOptions{.archive = folder->archive.get(),
+                                                                    .epoch = epoch,
+                                                                    .nonce = epoch,
+                                                                    .begin_held = options.held,
+                                                                    .attended = options.held});
+  run_to_rest(*controller, {world, scanner_cable, robot_cable, *controller, *folder->store}, clock, options);
+
+  SimulatedRun run{.result = result_of(*controller, {.plate = folder->names.plate,
+                                                     .seed = options.cell.seed,
+                                                     .remark = folder->names.remark}),
+                   .folder = folder->path};
+  auto& result = run.result;
+  run.exit_code = exit_code(result.outcome);
+  if (controller->recorder().store_failed())
+    return std::unexpected{SimError{std::string{controller->recorder().store_error().view()}}};
+  if (!options.resume && !controller->cell().has_driven()) {
+    run.summary = summary_json(result);
+    firmware_like::discard_run(std::move(*folder));
+    return run;
+  }
+  std::optional<firmware_like::PlateField> errors;
+  if (result.measured) {
+    const auto verdict = judge(*plate, result.measured->surface, result.measured->outline.corners);
+    if (!verdict) return std::unexpected{verdict.error()};
+    result.truth = truth_json(*verdict);
+    if (options.write_everything) errors = error_field(*verdict, result.measured->surface, 56);
+  }
+  run.summary = summary_json(result);
+  if (options.write_everything) {
+    const auto written = write_results(result, *folder, errors);
+    if (!written) return std::unexpected{SimError{written.error().what}};
+  }
+  return run;
+}
+
+}  // namespace moldloft::host_sim

@@ -1,0 +1,216 @@
+// What happens inside Execute: seek the edge, track the boundary, plan, scan, finish the fit.
+#include "hal/base/reserved.hpp"
+#include "tasks/cell/cell.hpp"
+#include "tasks/planning/tool_pose.hpp"
+
+namespace moldloft::tasks {
+
+using hal::ShotPurpose;
+using Stage = SurfaceTask::Stage;
+
+namespace {
+
+// Plate points that go into the rough height model: a few of each shot are plenty for six coefficients.
+constexpr std::uint32_t height_stride = 20;
+
+// How far the hint may be off once the plate has been seen: a field's width at 10 degrees.
+constexpr double hint_reach_mm = 18;
+
+// How far inside the outline the hint of a surface shot lies, when the field's centre is outside.
+constexpr double hint_inside_mm = 10;
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+bool inside_quad(const std::array<Eigen::Vector2d, 4>& corners, const Eigen::Vector2d& p) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (cross(corners[(i + 1) % 4] - corners[i], p - corners[i]) < 0) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+void Cell::set_phase(Phase phase) {
+  if (phase == phase_) return;
+  record("phase", "", to_string(phase_), to_string(phase));
+  phase_ = phase;
+}
+
+void Cell::measure() {
+  set_phase(Phase::seek_edge);
+  boundary_places_.clear();
+  surface_planned_ = surface_next_ = 0;
+  plan_begun_ = false;
+  heights_.reset();
+  measuring_ = Duration{0};
+  time_left_.begin(settings_.start.centre.head<2>());
+  surface_.begin();
+  tracker_.begin(settings_.start);
+  want(settings_.start, ShotPurpose::seek);
+}
+
+// Looks at what the background work has come to.
+void Cell::advance_phase() {
+  if (surface_.stage() == Stage::failed && phase_ != Phase::none) {
+    const auto reason = geometry::to_string(surface_.error());
+    const bool too_small = surface_.error() == geometry::Error::capacity;
+    return hold(too_small ? HoldCause::plan : HoldCause::measurement,
+                hal::Message::format("{}: {}", to_string(phase_), reason));
+  }
+  switch (phase_) {
+    case Phase::plan_scan:
+      if (surface_.outline_ready()) plan_surface();
+      return;
+    case Phase::scan_surface:
+      if (surface_next_ == surface_planned_ && !wanted_ && !looking_ && shot_state_ == ShotState::parked &&
+          surface_.stage() == Stage::open) {
+        surface_.solve();
+        set_phase(Phase::finish_fit);
+      }
+      return;
+    case Phase::finish_fit:
+      if (surface_.stage() != Stage::ready) return;
+      surface_ready_ = now_;
+      set_phase(Phase::none);
+      return apply(CellEvent::done);
+    default:
+      return;
+  }
+}
+
+// Hands a shot's frame to the background work for finding the plate in it, which may begin before all of it is there;
+// use_shot() follows when that is done and the frame was accepted.
+void Cell::look_at(const Order& order, const hal::Frame& frame, hal::Scanner* unpacks) {
+  looked_at_ = order;
+  const geometry::RigidMotion world_from_scanner =
+      scanner_motion_at(order.reported, settings_.tip_from_scanner);
+  // Nobody knows a plate's height before it was seen; from then on the hint is good to a step's slope.
+  const double reach = order.purpose == ShotPurpose::seek ? settings_.depth_mm : hint_reach_mm;
+  view_.begin(frame,
+              {.hint = into_scanner(world_from_scanner, hint_in_world(order)),
+               .reach_mm = reach,
+               .boundary = order.purpose != ShotPurpose::surface},
+              unpacks);
+  surface_.look(view_);
+  looking_ = true;
+  accepted_ = false;
+}
+
+// What has been looked at so far was no frame: it will not become whole.
+void Cell::drop_look() {
+  if (!looking_ || accepted_) return;
+  surface_.stop_looking();
+  looking_ = false;
+}
+
+void Cell::accept(const hal::Frame& frame) {
+  accepted_ = true;
+  ++taken_[static_cast<std::size_t>(looked_at_.purpose)];
+  points_seen_ += frame.point_count;
+  time_left_.took({.purpose = looked_at_.purpose,
+                   .centre = looked_at_.place.centre.head<2>(),
+                   .spent = measuring_,
+                   .from_archive = archive_ != nullptr && looked_at_.number <= archive_->last()});
+}
+
+void Cell::use_shot() {
+  looking_ = false;
+  const Order& order = looked_at_;
+  const geometry::RigidMotion world_from_scanner =
+      scanner_motion_at(order.reported, settings_.tip_from_scanner);
+  if (order.purpose == ShotPurpose::surface) {
+    if (view_.found()) surface_.fold(view_, world_from_scanner);
+    return;
+  }
+  hal::add_within_reserve(boundary_places_, order.place);
+  const std::optional<double> height = view_.found() ? learn_heights(world_from_scanner) : std::nullopt;
+  if (height) surface_.keep(view_, world_from_scanner);
+  use_boundary_shot(order, world_from_scanner, height);
+}
+
+// Adds the shot's heights to the rough model and gives their mean; nothing when what was found is the table.
+std::optional<double> Cell::learn_heights(const geometry::RigidMotion& world_from_scanner) {
+  HeightModel learnt = heights_;
+  double sum = 0;
+  int count = 0;
+  std::array<Eigen::Vector3d, 64> points;
+  view_.rewind(height_stride);
+  for (std::size_t n = view_.next(points); n > 0; n = view_.next(points)) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const Eigen::Vector3d p = world_from_scanner * points[i];
+      learnt.add(p);
+      sum += p.z();
+      ++count;
+    }
+  }
+  if (count == 0 || sum / count < settings_.lowest_plate_z_mm) return std::nullopt;
+  heights_ = learnt;
+  return sum / count;
+}
+
+Eigen::Vector3d Cell::hint_in_world(const Order& order) const {
+  if (order.purpose != ShotPurpose::surface) return tracker_.plate_hint();
+  const auto& corners = surface_.outline().corners;
+  const Eigen::Vector2d middle = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;
+  Eigen::Vector2d p = order.place.centre.head<2>();
+  if (!inside_quad(corners, p)) {
+    const Eigen::Vector2d inwards = (middle - p).normalized();
+    while (!inside_quad(corners, p) && (middle - p).norm() > 1) p += inwards;
+    p += hint_inside_mm * inwards;
+  }
+  return {p.x(), p.y(), heights_.at(p.x(), p.y())};
+}
+
+void Cell::use_boundary_shot(const Order& order, const geometry::RigidMotion& world_from_scanner,
+                             std::optional<double> plate_z_mm) {
+  const auto step = tracker_.take({.world_from_scanner = world_from_scanner,
+                                   .plate_found = plate_z_mm.has_value(),
+                                   .plate_z_mm = plate_z_mm.value_or(0),
+                                   .view = view_.boundary()});
+  record("tracker", to_string(step.event), to_string(step.from), to_string(step.to),
+         hal::Message::format("shot {}: {}", order.number, to_string(step.action)));
+  switch (step.to) {
+    case TrackState::failed:
+      return hold(step.action == TrackAction::report_too_large ? HoldCause::plan : HoldCause::measurement,
+                  step.text);
+    case TrackState::closed:
+      set_phase(Phase::plan_scan);
+      heights_.solve();
+      time_left_.boundary_is_closed();
+      return surface_.build_outline(tracker_.edge_points(), tracker_.corners());
+    case TrackState::seek_edge:
+      break;
+    default:
+      time_left_.edge_is_found();
+      set_phase(Phase::track_boundary);
+      break;
+  }
+  if (step.next)
+    want(*step.next, step.to == TrackState::seek_edge ? ShotPurpose::seek : ShotPurpose::boundary);
+}
+
+// In the slack: what the rows of a zig-zag cost belongs into no tick.
+void Cell::plan_surface() {
+  if (!plan_begun_) {
+    const auto& last = boundary_places_.back();
+    zigzag_.begin(surface_.outline(), heights_, settings_.scan, last.centre.head<2>(), last.head_yaw,
+                  surface_places_);
+    surface_.plan(zigzag_);
+    plan_begun_ = true;
+  }
+  if (surface_.planning()) return;
+  const auto planned = zigzag_.result();
+  if (!planned) {
+    return hold(HoldCause::plan, "the plate needs more shots than are planned for: raise [plate] largest_mm");
+  }
+  surface_planned_ = *planned;
+  surface_next_ = 0;
+  set_phase(Phase::scan_surface);
+  next_surface_shot();
+}
+
+void Cell::next_surface_shot() {
+  if (surface_next_ < surface_planned_) want(surface_places_[surface_next_++], ShotPurpose::surface);
+}
+
+}  // namespace moldloft::tasks

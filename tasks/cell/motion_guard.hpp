@@ -1,0 +1,42 @@
+// The last check before a target goes to the robot: finite, inside the workspace, not too long a step, not
+// too fast. What fails is never sent; the message names the limit. And the first check of where it says it has arrived.
+//
+// Units mm and rad, world frame. Pure, no allocation.
+#pragma once
+
+#include "hal/base/fixed_text.hpp"
+#include "hal/base/realtime.hpp"
+#include "hal/robot/pose.hpp"
+
+#include <array>
+#include <optional>
+
+namespace moldloft::tasks {
+
+struct Range {
+  double min = 0, max = 0;
+  bool contains(double v) const { return v >= min && v <= max; }
+};
+
+struct Workspace {
+  Range x_mm{-2000, 2000}, y_mm{-2000, 2000}, z_mm{-500, 1000};  // of the robot's tip
+  Range reach_mm{0, 1e9};     // distance of the tip from the robot's axis: a SCARA reaches a ring
+  double max_step_mm = 2000;  // from where it stands
+  int max_speed_percent = 100;
+};
+
+// How far from its target an arm that says it has arrived may stand. Arms settle within tenths of a millimetre; what
+// lies this far off is a wrong tool, a wrong frame, another convention of angles, or digits that the line has changed.
+struct Arrival {
+  double distance_mm = 5, turn_rad = 2 * hal::degree;
+};
+
+// Nothing when the target may be sent; else one line: which limit, by how much.
+std::optional<hal::Message> refuse_target(const hal::Pose& target, const hal::Pose& standing,
+                                          int speed_percent, const Workspace& workspace) MOLDLOFT_NONBLOCKING;
+
+// Nothing when the pose that was read back is where the arm was sent; else one line that says how far off it is.
+std::optional<hal::Message> refuse_arrival(const hal::Pose& reported, const hal::Pose& commanded,
+                                           const Arrival&) MOLDLOFT_NONBLOCKING;
+
+}  // namespace moldloft::tasks

@@ -1,0 +1,49 @@
+// What a person should read of what happened in the control thread: holds, aborts and warnings with their reasons, from
+// that thread to one other.
+//
+// Thread       push(): the control thread. pop(): one other thread
+// Blocking     never; no locks
+// Allocation   none
+// Failure      a full queue drops the newest: the run store has all of them
+#pragma once
+
+#include "hal/base/clock.hpp"
+#include "hal/base/fixed_text.hpp"
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+namespace moldloft::tasks {
+
+struct Notice {
+  enum class Kind : std::uint8_t { goes_on, warning, hold, abort };
+  hal::Instant at{0};
+  Kind kind{};
+  hal::Message text;
+};
+
+class NoticeQueue {
+ public:
+  void push(const Notice& notice) noexcept {
+    const auto written = written_.load(std::memory_order_relaxed);
+    if (written - read_.load(std::memory_order_acquire) == notices_.size()) return;
+    notices_[written % notices_.size()] = notice;
+    written_.store(written + 1, std::memory_order_release);
+  }
+  std::optional<Notice> pop() noexcept {
+    const auto read = read_.load(std::memory_order_relaxed);
+    if (read == written_.load(std::memory_order_acquire)) return std::nullopt;
+    const Notice notice = notices_[read % notices_.size()];
+    read_.store(read + 1, std::memory_order_release);
+    return notice;
+  }
+
+ private:
+  std::array<Notice, 64> notices_{};
+  std::atomic<std::size_t> written_{0}, read_{0};
+};
+
+}  // namespace moldloft::tasks

@@ -1,0 +1,191 @@
+#include "tasks/machines/boundary_tracker.hpp"
+
+#include "tasks/flat_world.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <string>
+
+using namespace moldloft;
+using namespace moldloft::tasks;
+using Eigen::Vector2d;
+
+namespace {
+
+std::vector<Vector2d> placed(std::vector<Vector2d> corners, double turn) {
+  Vector2d middle = Vector2d::Zero();
+  for (const auto& c : corners) middle += c / static_cast<double>(corners.size());
+  for (auto& c : corners) c = Eigen::Rotation2Dd(turn) * (c - middle) + Vector2d{500, 20};
+  return corners;
+}
+
+const std::vector<Vector2d> square{{0, 0}, {305, 0}, {305, 305}, {0, 305}};
+const std::vector<Vector2d> rectangle{{0, 0}, {600, 0}, {600, 150}, {0, 150}};
+const std::vector<Vector2d> trapezoid{{0, 0}, {305, 0}, {245, 254}, {60, 254}};
+const std::vector<Vector2d> sheared{
+    {0, 0}, {260, 0}, {390, 225}, {130, 225}};  // corners of 60 and 120 degrees
+
+double distance_to_outline(const Vector2d& p, const std::vector<Vector2d>& outline) {
+  double least = 1e9;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Vector2d a = outline[i], d = outline[(i + 1) % outline.size()] - a;
+    const double t = std::clamp((p - a).dot(d) / d.squaredNorm(), 0.0, 1.0);
+    least = std::min(least, (p - a - t * d).norm());
+  }
+  return least;
+}
+
+const ShotPlace start{.centre = {500, 20, 5}, .head_yaw = 0};
+
+}  // namespace
+
+TEST_CASE("the loop closes on every four-sided plate, however it is turned, and sees all four corners") {
+  BoundaryTracker tracker{TrackerSettings{.overlap_mm = 45}};
+  for (const auto& shape : {square, rectangle, trapezoid, sheared}) {
+    for (double turn = 0; turn < 6.28; turn += 0.21) {
+      const FlatWorld world{.outline = placed(shape, turn)};
+      const Walk walk = walk_round(tracker, world, start);
+      INFO("turned by ", turn);
+      REQUIRE(walk.last.to == TrackState::closed);
+      for (const auto& corner : world.outline) {
+        double nearest = 1e9;
+        for (const auto& seen : tracker.corners()) nearest = std::min(nearest, (seen - corner).norm());
+        CHECK(nearest < 3);
+      }
+    }
+  }
+}
+
+TEST_CASE(
+    "every edge point that is remembered lies on the outline, and the outline has no stretch without one") {
+  BoundaryTracker tracker{TrackerSettings{.overlap_mm = 45}};
+  const FlatWorld world{.outline = placed(trapezoid, 0.7)};
+  REQUIRE(walk_round(tracker, world, start).last.to == TrackState::closed);
+  for (const auto& p : tracker.edge_points()) CHECK(distance_to_outline(p, world.outline) < 0.3);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Vector2d a = world.outline[i], b = world.outline[(i + 1) % 4];
+    for (double t = 0.02; t < 1; t += 0.02) {
+      const Vector2d p = a + t * (b - a);
+      const bool seen = std::any_of(tracker.edge_points().begin(), tracker.edge_points().end(),
+                                    [&](const Vector2d& e) { return (e - p).norm() < 6; });
+      CHECK(seen);
+    }
+  }
+}
+
+TEST_CASE("a boundary parallel to the stripes is found by turning the head") {
+  BoundaryTracker tracker{TrackerSettings{}};
+  const FlatWorld world{.outline = placed(square, 0)};  // stripes along y, the first edge met along x too
+  const Walk walk = walk_round(tracker, world, start);
+  CHECK(walk.last.to == TrackState::closed);
+  CHECK(walk.turns == 1);  // the first turn crosses both the boundary and where the stripes were
+}
+
+TEST_CASE(
+    "where the boundary hides, the head turns so that stripes cross both what was seen and what hides") {
+  BoundaryTracker tracker{TrackerSettings{}};
+  tracker.begin(start);
+  // A straight piece along world +x through the field's middle, made by hand: scanner at yaw 0, stripes along y.
+  std::vector<geometry::EdgePoint> points;
+  for (int i = 0; i < 20; ++i)
+    points.push_back({.position = {2.0 * i - 20, 0, 0}, .stripe = static_cast<std::uint16_t>(i)});
+  geometry::BoundaryPiece piece;
+  piece.count = 20;
+  piece.tangent_first = piece.tangent_last = {1, 0};
+  const auto show = [&] {
+    geometry::BoundaryViewer::View view;
+    view.points = points;
+    view.pieces = {&piece, 1};
+    return tracker.take({.world_from_scanner = geometry::turned_about_z(0, start.centre),
+                         .plate_found = true,
+                         .plate_z_mm = 6,
+                         .view = view});
+  };
+  REQUIRE(show().to == TrackState::first_side);
+  REQUIRE(show().to == TrackState::track);
+  piece.hidden_last = true;
+  const auto step = show();
+  REQUIRE(step.action == TrackAction::turn);
+  const double stripe = step.next->head_yaw + 1.5707963;
+  CHECK(std::abs(std::sin(stripe)) > 0.7);  // across the seen side, which runs along x
+  CHECK(std::abs(std::cos(stripe)) > 0.7);  // across the old stripes, along which the rest hides
+}
+
+TEST_CASE("a start off the plate is said so at once") {
+  BoundaryTracker tracker{TrackerSettings{}};
+  const FlatWorld world{.outline = placed(square, 0)};
+  const Walk walk = walk_round(tracker, world, {.centre = {900, 20, 5}, .head_yaw = 0});
+  CHECK(walk.last.to == TrackState::failed);
+  CHECK(walk.shots == 1);
+  CHECK(std::string{walk.last.text.view()} ==
+        "no plate under the scanner at x 900 y 20 mm: move [start] onto the plate");
+}
+
+TEST_CASE("a plate without an end within the seek limit is said so") {
+  BoundaryTracker tracker{TrackerSettings{.max_seek_steps = 5}};
+  const FlatWorld world{.outline = {{-5000, -5000}, {5000, -5000}, {5000, 5000}, {-5000, 5000}}};
+  const Walk walk = walk_round(tracker, world, start);
+  CHECK(walk.last.to == TrackState::failed);
+  CHECK(walk.last.action == TrackAction::report_no_edge);
+  CHECK(walk.shots == 6);
+}
+
+TEST_CASE("a plan that is one shot or one edge point too small is said so, one that just holds is enough") {
+  const FlatWorld world{.outline = placed(rectangle, 0.3)};
+  BoundaryTracker roomy{TrackerSettings{}};
+  const int shots = walk_round(roomy, world, start).shots;
+  const std::size_t edges = roomy.edge_points().size();
+  REQUIRE(roomy.state() == TrackState::closed);
+  REQUIRE(shots > 10);
+  REQUIRE(edges > 1000);
+
+  BoundaryTracker exact{TrackerSettings{.max_shots = shots, .max_edge_points = edges}};
+  CHECK(walk_round(exact, world, start).last.to == TrackState::closed);
+  CHECK(std::ranges::equal(exact.edge_points(), roomy.edge_points()));
+
+  BoundaryTracker few_shots{TrackerSettings{.max_shots = shots - 1}};
+  const Walk stopped = walk_round(few_shots, world, start);
+  CHECK(stopped.last.action == TrackAction::report_too_large);
+  CHECK(stopped.shots == shots - 1);
+  CHECK(stopped.last.text.view().starts_with("outline not closed after " + std::to_string(shots - 1) +
+                                             " shots,"));
+
+  BoundaryTracker few_edges{TrackerSettings{.max_edge_points = edges - 1}};
+  const Walk full = walk_round(few_edges, world, start);
+  CHECK(full.last.to == TrackState::failed);
+  CHECK(full.last.action == TrackAction::report_too_large);
+  CHECK(full.last.text.view().ends_with("raise [plate] largest_mm"));
+  // Those before are all there, those of the last shot have not been begun with.
+  const std::size_t kept = few_edges.edge_points().size();
+  CHECK(kept < edges);
+  CHECK(std::ranges::equal(few_edges.edge_points(), roomy.edge_points().first(kept)));
+}
+
+TEST_CASE("heads that turn at every place do not outrun the plan's shots") {
+  // A boundary that hides, then shows, for ever: the table alone would go on as long as it is told so.
+  BoundaryTracker tracker{TrackerSettings{.max_shots = 12}};
+  const FlatWorld world{.outline = placed(rectangle, 0.3)};
+  hal::Frame frame{100, 50000};
+  ShotView view{100, 50000, {}};
+  tracker.begin(start);
+  ShotPlace place = start;
+  int shots = 0;
+  for (; shots < 100; ++shots) {
+    const auto motion = geometry::turned_about_z(place.head_yaw, place.centre);
+    world.expose(motion, frame);
+    view.begin(frame, {.hint = motion.inverse() * tracker.plate_hint(), .reach_mm = 60});
+    while (!view.step()) {
+    }
+    std::vector<geometry::BoundaryPiece> pieces(view.boundary().pieces.begin(), view.boundary().pieces.end());
+    auto seen = view.boundary();
+    for (auto& piece : pieces) piece.hidden_last = tracker.state() == TrackState::track;
+    seen.pieces = pieces;
+    const auto step = tracker.take(
+        {.world_from_scanner = motion, .plate_found = true, .plate_z_mm = world.plate_z, .view = seen});
+    if (!step.next) break;
+    place = *step.next;
+  }
+  CHECK(tracker.state() == TrackState::failed);
+  CHECK(shots + 1 == 12);
+}

@@ -1,0 +1,121 @@
+// The tables are complete: every pair of state and event is listed or explicitly ignored, never both, and
+// every state can be reached.
+#include "tasks/machines/boundary_tracker.hpp"
+#include "tasks/machines/cell_state.hpp"
+#include "tasks/machines/shot_sequence.hpp"
+
+#include <doctest/doctest.h>
+
+#include <set>
+#include <utility>
+
+using namespace moldloft::tasks;
+
+namespace {
+
+template <typename Table, typename Ignored>
+void check_complete(Table table, Ignored ignored, int states, int events) {
+  std::set<std::pair<int, int>> listed, left_out;
+  for (const auto& row : table) listed.emplace(static_cast<int>(row.from), static_cast<int>(row.on));
+  for (const auto& pair : ignored) {
+    const bool is_new = left_out.emplace(static_cast<int>(pair.in), static_cast<int>(pair.event)).second;
+    CHECK_MESSAGE(is_new, "ignored twice: ", to_string(pair.in), " / ", to_string(pair.event));
+  }
+  for (int s = 0; s < states; ++s) {
+    for (int e = 0; e < events; ++e) {
+      const bool in_table = listed.contains({s, e}), in_ignored = left_out.contains({s, e});
+      CHECK_MESSAGE(in_table != in_ignored, "state ", s, " event ", e, in_table ? " is both" : " is neither");
+    }
+  }
+}
+
+template <typename Table>
+void check_reachable(Table table, int states) {
+  std::set<int> reached{0};
+  for (std::size_t before = 0; before != reached.size();) {
+    before = reached.size();
+    for (const auto& row : table) {
+      if (reached.contains(static_cast<int>(row.from))) reached.insert(static_cast<int>(row.to));
+    }
+  }
+  CHECK(reached.size() == static_cast<std::size_t>(states));
+}
+
+// The last row of each (state, event) must have a guard that always agrees, or an event could fall through unseen.
+template <typename Table, typename Context>
+void check_no_fall_through(Table table, const Context& exhausted) {
+  std::set<std::pair<int, int>> pairs, covered;
+  for (const auto& row : table) {
+    pairs.emplace(static_cast<int>(row.from), static_cast<int>(row.on));
+    if (row.guard(exhausted)) covered.emplace(static_cast<int>(row.from), static_cast<int>(row.on));
+  }
+  CHECK(pairs == covered);
+}
+
+}  // namespace
+
+TEST_CASE("the supervisor's table answers every event in every state") {
+  check_complete(cell_transitions(), cell_ignored(), cell_state_count, cell_event_count);
+  check_reachable(cell_transitions(), cell_state_count);
+}
+
+TEST_CASE("the shot sequence's table answers every event in every state") {
+  check_complete(shot_transitions(), shot_ignored(), shot_state_count, shot_event_count);
+  check_reachable(shot_transitions(), shot_state_count);
+}
+
+TEST_CASE("the tracker's table answers every event in every state, whatever its counters say") {
+  check_complete(track_transitions(), track_ignored(), track_state_count, track_event_count);
+  check_reachable(track_transitions(), track_state_count);
+  check_no_fall_through(track_transitions(), TrackContext{});  // all counters at their limits
+}
+
+TEST_CASE("abort is taken from every state but those that have aborted already") {
+  for (int s = 0; s < cell_state_count; ++s) {
+    const auto state = static_cast<CellState>(s);
+    const bool aborted = state == CellState::aborting || state == CellState::aborted;
+    CHECK((find_transition(cell_transitions(), state, CellEvent::abort, CellContext{}) == nullptr) ==
+          aborted);
+  }
+}
+
+// Every state that any order of events can lead to, without those of `never`.
+std::set<CellState> reachable_without(CellState from, CellContext context, std::set<CellEvent> never) {
+  std::set<CellState> reached{from};
+  for (std::size_t before = 0; before != reached.size();) {
+    before = reached.size();
+    for (const CellState state : std::set{reached}) {
+      for (int e = 0; e < cell_event_count; ++e) {
+        const auto event = static_cast<CellEvent>(e);
+        const auto* row =
+            never.contains(event) ? nullptr : find_transition(cell_transitions(), state, event, context);
+        if (row != nullptr) reached.insert(row->to);
+      }
+    }
+  }
+  return reached;
+}
+
+TEST_CASE("a cell that starts held moves in no order of events that lacks an operator's unhold and start") {
+  const auto* row =
+      find_transition(cell_transitions(), CellState::idle, CellEvent::start_held, CellContext{});
+  REQUIRE(row != nullptr);
+  CHECK(row->to == CellState::held);
+  CHECK(row->action == CellAction::wait_for_operator);
+  const auto reached = reachable_without(row->to, {.begun = false}, {CellEvent::unhold, CellEvent::start});
+  for (const auto moving :
+       {CellState::starting, CellState::execute, CellState::unholding, CellState::completing})
+    CHECK_FALSE(reached.contains(moving));
+  CHECK(reached.contains(CellState::stopped));
+  CHECK(reached.contains(CellState::aborted));
+}
+
+TEST_CASE("unhold begins a cell that was started held, and takes up again one that has begun") {
+  const auto after = [](bool begun) {
+    return find_transition(cell_transitions(), CellState::held, CellEvent::unhold,
+                           CellContext{.begun = begun})
+        ->to;
+  };
+  CHECK(after(false) == CellState::starting);
+  CHECK(after(true) == CellState::unholding);
+}
