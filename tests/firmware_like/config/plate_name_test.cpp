@@ -116,7 +116,7 @@ TEST_CASE("a store of before plates had names is called by its folder, and takes
 }
 
 TEST_CASE("what is said of a run in one line: plate, cell, time, program, remark, as far as they are known") {
-  CHECK(about_run(named_in(Json::object())) == "");
+  CHECK(about_run(named_in(Json::object())) == "plate measured");  // as CAD files call it
   CHECK(about_run(named_in(Json{{"plate", "17"}})) == "plate 17");
   CHECK(about_run(
             named_in(Json{{"plate", "17"},
