@@ -183,24 +183,25 @@ RunConditions run_beside_threads(Controller& controller, const CellConfig& confi
 }
 
 // Under the journal, for whoever watches it: on a terminal and in the report the timing says the same.
-void warn_of_missed_ticks(const Controller& controller, const RunConditions& conditions) {
-  const std::string line = missed_ticks_line(timing_of(controller, &conditions));
+void warn_of_missed_ticks(const RunResult& result) {
+  const std::string line = missed_ticks_line(result.timing);
   if (stderr_is_journal() && !line.empty()) complain(line, "moldloft", Priority::warning);
 }
 
 // What is left behind and said when the cell has come to rest.
 int wind_up(Controller& controller, RunFolder folder, const RunOptions& options, bool resumed,
             const RunConditions& conditions) {
-  const int code = exit_code(outcome_of(controller));
-  warn_of_missed_ticks(controller, conditions);
+  const RunResult result = result_of(
+      controller,
+      {.plate = folder.names.plate, .seed = {}, .begun = begun_of(folder), .remark = folder.names.remark},
+      &conditions);
+  const int code = exit_code(result.outcome);
+  warn_of_missed_ticks(result);
   if (!resumed && !controller.cell().has_driven()) {
     discard_run(std::move(folder));
     return complain(why_refused(controller), "moldloft", priority_of(code)),
            code == exit_aborted ? exit_failed : code;
   }
-  const RunLabel label{
-      .plate = folder.names.plate, .seed = {}, .begun = begun_of(folder), .remark = folder.names.remark};
-  const RunResult result = result_of(controller, label, &conditions);
   const bool store_failed = controller.recorder().store_failed();
   if (store_failed) {
     complain(
