@@ -35,36 +35,37 @@ struct PscScanner::Transition {
 
 using D = PscScanner;
 
-// First match counts; a pair that is not listed is ignored (a late answer to a question that nobody asks any
-// more). clang-format off
+// First match counts; a pair that is not listed is ignored (a late answer to a question
+// that nobody asks any more).
+// clang-format off
 const PscScanner::Transition PscScanner::transitions[] = {
     // from              cue                guard             action                    to
-    {Phase::idle, Cue::start, &D::always, &D::open_link, Phase::opening},
-    {Phase::waiting, Cue::wait_over, &D::always, &D::open_link, Phase::opening},
-    {Phase::opening, Cue::link_open, &D::always, &D::greet, Phase::greeting},
-    {Phase::greeting, Cue::greeted, &D::always, &D::configure, Phase::configuring},
-    {Phase::configuring, Cue::configured, &D::shot_waits, &D::announce_and_trigger, Phase::exposing},
-    {Phase::configuring, Cue::configured, &D::frame_waits, &D::announce_and_trigger, Phase::computing},
-    {Phase::configuring, Cue::configured, &D::shot_is_void, &D::announce_and_fail, Phase::ready},
-    {Phase::configuring, Cue::configured, &D::always, &D::announce, Phase::ready},
-    {Phase::ready, Cue::triggered, &D::always, &D::send_trigger, Phase::exposing},
-    {Phase::exposing, Cue::exposed, &D::always, &D::report_exposed, Phase::computing},
-    {Phase::exposing, Cue::frame, &D::always, &D::report_both, Phase::ready},
-    {Phase::exposing, Cue::late, &D::has_retries, &D::send_trigger, Phase::exposing},
-    {Phase::exposing, Cue::late, &D::always, &D::fail_shot, Phase::ready},
-    {Phase::exposing, Cue::exposed_anew, &D::always, &D::fail_shot, Phase::ready},
-    {Phase::exposing, Cue::forgotten, &D::always, &D::drop_shot, Phase::ready},
-    {Phase::computing, Cue::frame, &D::always, &D::report_frame, Phase::ready},
-    {Phase::computing, Cue::late, &D::has_retries, &D::send_trigger, Phase::computing},
-    {Phase::computing, Cue::late, &D::always, &D::fail_shot, Phase::ready},
-    {Phase::computing, Cue::exposed_anew, &D::always, &D::fail_shot, Phase::ready},
-    {Phase::computing, Cue::forgotten, &D::always, &D::drop_shot, Phase::ready},
-    {Phase::opening, Cue::link_lost, &D::always, &D::back_off, Phase::waiting},
-    {Phase::greeting, Cue::link_lost, &D::always, &D::back_off, Phase::waiting},
-    {Phase::configuring, Cue::link_lost, &D::always, &D::back_off, Phase::waiting},
-    {Phase::ready, Cue::link_lost, &D::always, &D::report_loss, Phase::waiting},
-    {Phase::exposing, Cue::link_lost, &D::always, &D::report_loss, Phase::waiting},
-    {Phase::computing, Cue::link_lost, &D::always, &D::report_loss, Phase::waiting},
+    {Phase::idle,        Cue::start,        &D::always,       &D::open_link,            Phase::opening},
+    {Phase::waiting,     Cue::wait_over,    &D::always,       &D::open_link,            Phase::opening},
+    {Phase::opening,     Cue::link_open,    &D::always,       &D::greet,                Phase::greeting},
+    {Phase::greeting,    Cue::greeted,      &D::always,       &D::configure,            Phase::configuring},
+    {Phase::configuring, Cue::configured,   &D::shot_waits,   &D::announce_and_trigger, Phase::exposing},
+    {Phase::configuring, Cue::configured,   &D::frame_waits,  &D::announce_and_trigger, Phase::computing},
+    {Phase::configuring, Cue::configured,   &D::shot_is_void, &D::announce_and_fail,    Phase::ready},
+    {Phase::configuring, Cue::configured,   &D::always,       &D::announce,             Phase::ready},
+    {Phase::ready,       Cue::triggered,    &D::always,       &D::send_trigger,         Phase::exposing},
+    {Phase::exposing,    Cue::exposed,      &D::always,       &D::report_exposed,       Phase::computing},
+    {Phase::exposing,    Cue::frame,        &D::always,       &D::report_both,          Phase::ready},
+    {Phase::exposing,    Cue::late,         &D::has_retries,  &D::send_trigger,         Phase::exposing},
+    {Phase::exposing,    Cue::late,         &D::always,       &D::fail_shot,            Phase::ready},
+    {Phase::exposing,    Cue::exposed_anew, &D::always,       &D::fail_shot,            Phase::ready},
+    {Phase::exposing,    Cue::forgotten,    &D::always,       &D::drop_shot,            Phase::ready},
+    {Phase::computing,   Cue::frame,        &D::always,       &D::report_frame,         Phase::ready},
+    {Phase::computing,   Cue::late,         &D::has_retries,  &D::send_trigger,         Phase::computing},
+    {Phase::computing,   Cue::late,         &D::always,       &D::fail_shot,            Phase::ready},
+    {Phase::computing,   Cue::exposed_anew, &D::always,       &D::fail_shot,            Phase::ready},
+    {Phase::computing,   Cue::forgotten,    &D::always,       &D::drop_shot,            Phase::ready},
+    {Phase::opening,     Cue::link_lost,    &D::always,       &D::back_off,             Phase::waiting},
+    {Phase::greeting,    Cue::link_lost,    &D::always,       &D::back_off,             Phase::waiting},
+    {Phase::configuring, Cue::link_lost,    &D::always,       &D::back_off,             Phase::waiting},
+    {Phase::ready,       Cue::link_lost,    &D::always,       &D::report_loss,          Phase::waiting},
+    {Phase::exposing,    Cue::link_lost,    &D::always,       &D::report_loss,          Phase::waiting},
+    {Phase::computing,   Cue::link_lost,    &D::always,       &D::report_loss,          Phase::waiting},
 };
 // clang-format on
 

@@ -44,6 +44,7 @@ int rank_of(const Include& include, std::string_view path) {
 std::string_view comment_in(std::string_view line) {
   const auto at = line.find_first_not_of(" \t");
   if (at == line.npos || line.substr(at, 2) != "//") return {};
+  if (line.substr(at).starts_with("// clang-format o")) return {};  // it is for a program
   return line.substr(at + 2);
 }
 
