@@ -27,6 +27,7 @@ import time
 LONGEST_RUN_S = 150
 LONGEST_END_S = 30  # after a wish to stop: results of a small plate, on a busy machine
 TYPICAL_RUN_S = 9  # by the arm's motions; a misfortune after the end is none
+STARVED_S = 1.0  # a third of the silence by which controller and robot give each other up
 REST_SEEN_S = 1.0  # the robot's own watchdog would stop the arm only 2 s after the controller's last line or later
 WORDS = {0: "complete", 2: "held", 3: "aborted", 4: "stopped"}
 PLATE = ["--width", "150", "--depth", "120"]
@@ -51,6 +52,8 @@ class Start:
         self.may_lack_files = False
         self.process = None
         self.faults = []
+        self.seen = {}         # by process, how long its threads have waited for a processor so far
+        self.starved_s = 0.0   # the longest that one of them has waited in one piece, by the kernel's count
 
     def moment(self):
         return self.draw.uniform(0, TYPICAL_RUN_S)
@@ -83,8 +86,20 @@ class Start:
         """True when the controller still runs then."""
         end = time.monotonic() + seconds
         while time.monotonic() < end and self.process.poll() is None:
+            self.look_at_waiting()
             time.sleep(0.02)
         return self.process.poll() is None
+
+    def look_at_waiting(self):
+        """The kernel adds a wait to a thread's count when the wait is over: what comes at once was one."""
+        for process in (self.devices, self.process):
+            for thread in pathlib.Path(f"/proc/{process.pid}/task").glob("*/schedstat"):
+                try:
+                    waited_s = int(thread.read_text().split()[1]) / 1e9
+                except (OSError, IndexError, ValueError):
+                    continue  # ended meanwhile
+                self.starved_s = max(self.starved_s, waited_s - self.seen.get(thread, 0.0))
+                self.seen[thread] = waited_s
 
     def send(self, number):
         if self.process.poll() is None:
@@ -136,15 +151,19 @@ class Start:
         return code in told and not self.out.exists() and not self.device_lines("moves", "stands", "exposure")
 
     def machine_too_busy(self, code):
-        """Devices or controller did not get a processor for seconds: the run ends as it should then, but not complete."""
-        if os.getloadavg()[0] <= 2 * os.cpu_count() or code not in (1, 3):
+        """Devices or controller did not get a processor for a second or more, or the controller missed tick after tick, by
+        its own count: the run ends as it should then, but not complete."""
+        if code not in (1, 3):
             return False
         words = self.text()
         try:
             words += json.loads((self.out / "summary.json").read_text())["message"]
         except (OSError, ValueError, KeyError):
             pass
-        return self.unread or any(part in words for part in ("ticks in a row", "silent for", "no line came for"))
+        if "ticks in a row" in words:
+            return True
+        silence = self.unread or any(part in words for part in ("silent for", "no line came for"))
+        return silence and self.starved_s >= STARVED_S
 
     def judge_files(self, code):
         try:
@@ -447,6 +466,8 @@ def one_start(options, number):
     if s.faults and options.keep:
         shutil.copytree(folder, pathlib.Path(options.keep) / str(number), symlinks=True, dirs_exist_ok=True)
     shutil.rmtree(folder, ignore_errors=True)
+    if s.starved_s >= STARVED_S:
+        words = f"[waited {s.starved_s:.1f} s for a processor] {words}"
     return number, misfortune.__name__, code, words, s.faults
 
 
