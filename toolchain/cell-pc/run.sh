@@ -128,9 +128,15 @@ make_root() {
 # numbers are seeded: until bytes cross the cable, two runs of the same root are the same run. COM1 is the console, COM2
 # the controller's port; the robot's server has a 16550 on the PCI bus, for COM3 and COM4 would have to share lines with
 # them. The two are crossed by a socket.
+#
+# The record (rr=record) is not wanted and goes to /dev/null; the lock that comes with it is. The emulator has two threads: one
+# executes instructions, the other moves the clock on when the processor idles. Without the lock the second may look when the
+# processor has halted and its last instructions are not counted yet. The clock then goes too far by these, some hundredths of a
+# microsecond. Each interrupt of a timer may wake the second at such a moment; a busy host makes it likely.
 boot() {
   local pc=(
-    qemu-system-x86_64 -accel tcg -icount shift=1,sleep=off -rtc base=2026-01-01,clock=vm -seed "$seed" -cpu "$cpu" -m 512
+    qemu-system-x86_64 -accel tcg -icount shift=1,sleep=off,rr=record,rrfile=/dev/null
+    -rtc base=2026-01-01,clock=vm -seed "$seed" -cpu "$cpu" -m 512
     -nodefaults -display none -no-reboot -net none
     -kernel "$kernel" -initrd "$scratch/initramfs" -append "console=ttyS0 quiet panic=1"
     -chardev "file,id=console,path=$scratch/console" -device isa-serial,index=0,chardev=console
