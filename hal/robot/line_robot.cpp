@@ -74,10 +74,8 @@ using D = LineRobot;
 // clang-format off
 const LineRobot::Transition LineRobot::transitions[] = {
     // from            cue                guard            action                       to
-    {Phase::idle,      Cue::start,        &D::always,      &D::open_link,               Phase::opening},
-    {Phase::waiting,   Cue::wait_over,    &D::always,      &D::open_link,               Phase::opening},
-    {Phase::opening,   Cue::link_open,    &D::is_latched,  &D::nothing,                 Phase::faulted},
-    {Phase::opening,   Cue::link_open,    &D::always,      &D::start_sync,              Phase::syncing},
+    {Phase::offline,   Cue::link_open,    &D::is_latched,  &D::nothing,                 Phase::faulted},
+    {Phase::offline,   Cue::link_open,    &D::always,      &D::start_sync,              Phase::syncing},
     {Phase::syncing,   Cue::synced,       &D::always,      &D::ask_status,              Phase::checking},
     {Phase::syncing,   Cue::late,         &D::always,      &D::send_syn,                Phase::syncing},
     {Phase::checking,  Cue::stands_still, &D::always,      &D::ask_pose,                Phase::locating},
@@ -107,8 +105,7 @@ const LineRobot::Transition LineRobot::transitions[] = {
     {Phase::ready,     Cue::fault,        &D::always,      &D::report_fault,            Phase::faulted},
     {Phase::commanded, Cue::fault,        &D::always,      &D::report_fault,            Phase::faulted},
     {Phase::moving,    Cue::fault,        &D::always,      &D::report_fault,            Phase::faulted},
-    {Phase::waiting,   Cue::reset,        &D::always,      &D::unlatch,                 Phase::waiting},
-    {Phase::opening,   Cue::reset,        &D::always,      &D::unlatch,                 Phase::opening},
+    {Phase::offline,   Cue::reset,        &D::always,      &D::unlatch,                 Phase::offline},
     {Phase::syncing,   Cue::reset,        &D::always,      &D::start_sync,              Phase::syncing},
     {Phase::checking,  Cue::reset,        &D::always,      &D::start_sync,              Phase::syncing},
     {Phase::locating,  Cue::reset,        &D::always,      &D::start_sync,              Phase::syncing},
@@ -121,19 +118,25 @@ const LineRobot::Transition LineRobot::transitions[] = {
     {Phase::ready,     Cue::silent,       &D::always,      &D::report_silence,          Phase::syncing},
     {Phase::commanded, Cue::silent,       &D::always,      &D::report_silence,          Phase::syncing},
     {Phase::moving,    Cue::silent,       &D::always,      &D::report_silence,          Phase::syncing},
-    {Phase::opening,   Cue::link_lost,    &D::always,      &D::back_off,                Phase::waiting},
-    {Phase::syncing,   Cue::link_lost,    &D::always,      &D::report_loss,             Phase::waiting},
-    {Phase::checking,  Cue::link_lost,    &D::always,      &D::report_loss,             Phase::waiting},
-    {Phase::locating,  Cue::link_lost,    &D::always,      &D::report_loss,             Phase::waiting},
-    {Phase::ready,     Cue::link_lost,    &D::always,      &D::report_loss,             Phase::waiting},
-    {Phase::commanded, Cue::link_lost,    &D::always,      &D::report_loss,             Phase::waiting},
-    {Phase::moving,    Cue::link_lost,    &D::always,      &D::report_loss,             Phase::waiting},
-    {Phase::faulted,   Cue::link_lost,    &D::always,      &D::report_loss,             Phase::waiting},
+    {Phase::offline,   Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
+    {Phase::syncing,   Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
+    {Phase::checking,  Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
+    {Phase::locating,  Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
+    {Phase::ready,     Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
+    {Phase::commanded, Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
+    {Phase::moving,    Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
+    {Phase::faulted,   Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
 };
 // clang-format on
 
 LineRobot::LineRobot(ByteLink& link, const Settings& settings)
-    : link_{link},
+    : session_{link,
+               {.connect_timeout = settings.connect_timeout,
+                .first_back_off = settings.first_back_off,
+                .last_back_off = settings.last_back_off,
+                .heartbeat = settings.ping_period,
+                .silent_limit = settings.silent_limit,
+                .outbox_bytes = 1024}},
       settings_{settings},
       answer_time_{settings.ack_timeout + time_of_two_lines(settings.baud)},
       nonce_{settings.first_nonce} {
@@ -153,8 +156,8 @@ void LineRobot::cue(Cue what, Instant now) {
 // ---- what the cell asks
 
 void LineRobot::start(Instant now) {
-  if (phase_ == Phase::idle) why_ = "the robot has not answered SYN yet";
-  cue(Cue::start, now);
+  if (session_.state() == DeviceSession::State::closed) why_ = "the robot has not answered SYN yet";
+  session_.start(now);
 }
 void LineRobot::reset(Instant now) { cue(Cue::reset, now); }
 
@@ -186,9 +189,7 @@ void LineRobot::stop(Instant now) {
 
 RobotState LineRobot::state() const {
   switch (phase_) {
-    case Phase::idle:
-    case Phase::waiting:
-    case Phase::opening:
+    case Phase::offline:
       return RobotState::offline;
     case Phase::syncing:
     case Phase::checking:
@@ -208,31 +209,16 @@ RobotState LineRobot::state() const {
 
 // ---- actions of the table
 
-void LineRobot::open_link(Instant now) {
-  incoming_size_ = 0;
-  overlong_ = false;
-  outgoing_size_ = 0;
-  answer_due_ = now + settings_.connect_timeout;
-  heard_at_ = sent_at_ = now;
-  link_.open();
-}
-
-void LineRobot::back_off(Instant now) {
-  link_.close();
-  back_off_ = back_off_ == 0ns ? settings_.first_back_off : std::min(2 * back_off_, settings_.last_back_off);
-  wait_until_ = now + back_off_;
-}
-
 void LineRobot::report_loss(Instant now) {
   if (std::exchange(announced_, false))
     events_.push({.kind = RobotEvent::Kind::lost, .pose = pose_, .text = why_});
-  back_off(now);
+  session_.lose(now);
 }
 
 // The port is still there: the robot's program may only be restarting. SYN goes out until it answers.
 void LineRobot::report_silence(Instant now) {
   why_ = instead_of_lines().value_or(
-      Message::format("the robot has been silent for {} ms", (now - heard_at_) / 1ms));
+      Message::format("the robot has been silent for {} ms", session_.silence(now) / 1ms));
   if (std::exchange(announced_, false))
     events_.push({.kind = RobotEvent::Kind::lost, .pose = pose_, .text = why_});
   start_sync(now);
@@ -247,8 +233,7 @@ void LineRobot::start_sync(Instant now) {
 
 // The same nonce again: an answer that comes late still counts.
 void LineRobot::send_syn(Instant now) {
-  if (now - heard_at_ > settings_.silent_limit)
-    why_ = instead_of_lines().value_or("the robot does not answer SYN");
+  if (session_.is_silent(now)) why_ = instead_of_lines().value_or("the robot does not answer SYN");
   answer_due_ = now + answer_time_;
   send(format(Command{.verb = Verb::syn, .nonce = nonce_}), now);
 }
@@ -270,7 +255,7 @@ void LineRobot::ask_pose(Instant now) {
 }
 
 void LineRobot::announce(Instant) {
-  back_off_ = 0ns;
+  session_.greeted();
   announced_ = true;
   why_ = "";
   events_.push({.kind = RobotEvent::Kind::ready,
@@ -336,19 +321,19 @@ void LineRobot::unlatch(Instant) { latched_ = false; }
 // ---- what arrives
 
 void LineRobot::receive(Instant now) {
-  if (phase_ == Phase::idle || phase_ == Phase::waiting) return;
-  const LinkState link = link_.state();
-  if (link == LinkState::lost) {
-    why_ = link_.why();
-    cue(Cue::link_lost, now);
-    return;
+  const DeviceSession::News news = session_.receive();
+  if (news == DeviceSession::News::lost) {
+    why_ = session_.why();
+    return cue(Cue::link_lost, now);
   }
-  if (phase_ == Phase::opening) {
-    if (link == LinkState::open) cue(Cue::link_open, now);
-    return;
+  if (news == DeviceSession::News::opened) {
+    incoming_size_ = 0;
+    overlong_ = false;
+    return cue(Cue::link_open, now);
   }
+  if (!session_.is_open()) return;
   std::array<std::byte, bytes_a_tick> bytes;
-  const std::size_t count = link_.read(bytes);
+  const std::size_t count = session_.read(bytes);
   unread_ += count;
   take_bytes(std::span{bytes}.first(count), now);
 }
@@ -376,7 +361,7 @@ void LineRobot::take_bytes(std::span<const std::byte> bytes, Instant now) {
 void LineRobot::take_line(std::string_view line, Instant now) {
   const auto reply = parse_reply(line);
   if (!reply) return garbled(line, reply.error(), now);
-  heard_at_ = now;
+  session_.heard(now);
   unread_ = shown_size_ = 0;
   switch (reply->verb) {
     case Verb::nak:
@@ -500,25 +485,20 @@ void LineRobot::fault(Instant now, int code, const Message& text) {
 
 void LineRobot::transmit(Instant now) {
   watch(now);
-  flush();
+  session_.flush();
 }
 
 void LineRobot::watch(Instant now) {
-  if (phase_ == Phase::idle) return;
-  if (phase_ == Phase::waiting) {
-    if (now >= wait_until_) cue(Cue::wait_over, now);
-    return;
-  }
-  if (phase_ == Phase::opening) {
-    if (now < answer_due_) return;
+  if (session_.transmit(now) == DeviceSession::News::no_connection) {
     why_ = "the robot's port does not open";
     return cue(Cue::link_lost, now);
   }
+  if (!session_.is_open()) return;
   if (stop_wanted_ && now >= stop_due_) {
     stop_due_ = now + answer_time_;
     ask(Verb::stp, now);
   }
-  if (phase_ > Phase::syncing && now - heard_at_ > settings_.silent_limit) cue(Cue::silent, now);
+  if (phase_ > Phase::syncing && session_.is_silent(now)) cue(Cue::silent, now);
   if (has_command() && now >= done_due_) {
     stop(now);
     fault(now, 0,
@@ -526,25 +506,16 @@ void LineRobot::watch(Instant now) {
   }
   const bool waits = phase_ != Phase::ready && phase_ != Phase::faulted;
   if (waits && now >= answer_due_) cue(Cue::late, now);
-  if (now - sent_at_ >= settings_.ping_period) ask(has_command() ? Verb::sta : Verb::png, now);
+  if (session_.heartbeat_due(now)) ask(has_command() ? Verb::sta : Verb::png, now);
 }
 
 bool LineRobot::ask(Verb verb, Instant now) { return send(format(Command{.verb = verb}), now); }
 
 // A line goes into the buffer whole or not at all; one that finds no room is as good as lost on the way.
 bool LineRobot::send(std::string_view line, Instant now) {
-  if (line.empty() || line.size() > outgoing_.size() - outgoing_size_) return false;
-  std::ranges::copy(std::as_bytes(std::span{line}), outgoing_.begin() + outgoing_size_);
-  outgoing_size_ += line.size();
-  sent_at_ = now;
+  if (line.empty() || !session_.write(std::as_bytes(std::span{line}))) return false;
+  session_.said(now);
   return true;
-}
-
-void LineRobot::flush() {
-  if (outgoing_size_ == 0 || !is_open()) return;
-  const std::size_t count = link_.write(std::span{outgoing_}.first(outgoing_size_));
-  std::copy(outgoing_.begin() + count, outgoing_.begin() + outgoing_size_, outgoing_.begin());
-  outgoing_size_ -= count;
 }
 
 }  // namespace moldloft::hal

@@ -11,7 +11,7 @@
 #pragma once
 
 #include "hal/base/event_queue.hpp"
-#include "hal/links/byte_link.hpp"
+#include "hal/links/device_session.hpp"
 #include "hal/robot/robot.hpp"
 #include "hal/robot/robot_line.hpp"
 
@@ -52,7 +52,7 @@ class LineRobot final : public Robot {
   std::optional<RobotEvent> next_event() override { return events_.pop(); }
   RobotState state() const override;
   std::string_view why() const override { return why_; }
-  std::size_t plan_bytes() const override { return sizeof *this; }
+  std::size_t plan_bytes() const override { return sizeof *this + session_.plan_bytes(); }
 
   robot_line::Status last_status() const { return status_; }
   std::uint64_t garbled_lines() const { return garbled_lines_; }    // received, and thrown away
@@ -62,15 +62,12 @@ class LineRobot final : public Robot {
   static constexpr std::size_t shown_of_line =
       40;  // of a line in a message: verb and fields, with room for the reason
 
-  enum class Phase { idle, waiting, opening, syncing, checking, locating, ready, commanded, moving, faulted };
+  enum class Phase { offline, syncing, checking, locating, ready, commanded, moving, faulted };
   enum class Cue {
-    start,
-    wait_over,
     link_open,
     link_lost,
     silent,
     synced,
-    fit,
     in_motion,
     stands_still,
     located,
@@ -96,8 +93,6 @@ class LineRobot final : public Robot {
 
   // actions
   void nothing(Instant) MOLDLOFT_NONBLOCKING {}
-  void open_link(Instant now) MOLDLOFT_NONBLOCKING;
-  void back_off(Instant now) MOLDLOFT_NONBLOCKING;
   void report_loss(Instant now) MOLDLOFT_NONBLOCKING;
   void report_silence(Instant now) MOLDLOFT_NONBLOCKING;
   void start_sync(Instant now) MOLDLOFT_NONBLOCKING;
@@ -129,19 +124,17 @@ class LineRobot final : public Robot {
 
   std::optional<Message> instead_of_lines() const;
   void watch(Instant now);
-  bool is_open() const { return phase_ > Phase::opening; }
   bool has_command() const { return phase_ == Phase::commanded || phase_ == Phase::moving; }
   bool begin(robot_line::Command command, Instant now);
   bool ask(robot_line::Verb verb, Instant now);
   bool send(std::string_view line, Instant now);
-  void flush();
 
-  ByteLink& link_;
+  DeviceSession session_;
   const Settings settings_;
   const Duration answer_time_;  // ack_timeout and two of the longest lines
   EventQueue<RobotEvent, 16> events_;
 
-  Phase phase_ = Phase::idle;
+  Phase phase_ = Phase::offline;
   bool latched_ = false;         // a fault that no operator has cleared yet
   bool announced_ = false;       // ready was reported and not taken back by lost
   bool stop_wanted_ = false;     // STP is not answered yet
@@ -153,9 +146,6 @@ class LineRobot final : public Robot {
   Instant answer_due_{0};  // of the line that the phase waits on
   Instant stop_due_{0};
   Instant done_due_{0};
-  Instant wait_until_{0};
-  Instant heard_at_{0}, sent_at_{0};
-  Duration back_off_{0};
   robot_line::Status status_;
   Pose pose_;     // last reported
   int code_ = 0;  // of the last error or event
@@ -169,8 +159,6 @@ class LineRobot final : public Robot {
   std::array<char, shown_of_line> shown_{};  // of the last line that could not, its beginning
   std::size_t shown_size_ = 0;
   robot_line::Flaw flaw_{};  // of that line
-  std::array<std::byte, 1024> outgoing_{};
-  std::size_t outgoing_size_ = 0;
   std::uint64_t garbled_lines_ = 0, repeated_lines_ = 0;
 };
 

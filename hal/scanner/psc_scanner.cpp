@@ -40,9 +40,7 @@ using D = PscScanner;
 // clang-format off
 const PscScanner::Transition PscScanner::transitions[] = {
     // from              cue                guard             action                    to
-    {Phase::idle,        Cue::start,        &D::always,       &D::open_link,            Phase::opening},
-    {Phase::waiting,     Cue::wait_over,    &D::always,       &D::open_link,            Phase::opening},
-    {Phase::opening,     Cue::link_open,    &D::always,       &D::greet,                Phase::greeting},
+    {Phase::offline,     Cue::link_open,    &D::always,       &D::greet,                Phase::greeting},
     {Phase::greeting,    Cue::greeted,      &D::always,       &D::configure,            Phase::configuring},
     {Phase::configuring, Cue::configured,   &D::shot_waits,   &D::announce_and_trigger, Phase::exposing},
     {Phase::configuring, Cue::configured,   &D::frame_waits,  &D::announce_and_trigger, Phase::computing},
@@ -60,17 +58,23 @@ const PscScanner::Transition PscScanner::transitions[] = {
     {Phase::computing,   Cue::late,         &D::always,       &D::fail_shot,            Phase::ready},
     {Phase::computing,   Cue::exposed_anew, &D::always,       &D::fail_shot,            Phase::ready},
     {Phase::computing,   Cue::forgotten,    &D::always,       &D::drop_shot,            Phase::ready},
-    {Phase::opening,     Cue::link_lost,    &D::always,       &D::back_off,             Phase::waiting},
-    {Phase::greeting,    Cue::link_lost,    &D::always,       &D::back_off,             Phase::waiting},
-    {Phase::configuring, Cue::link_lost,    &D::always,       &D::back_off,             Phase::waiting},
-    {Phase::ready,       Cue::link_lost,    &D::always,       &D::report_loss,          Phase::waiting},
-    {Phase::exposing,    Cue::link_lost,    &D::always,       &D::report_loss,          Phase::waiting},
-    {Phase::computing,   Cue::link_lost,    &D::always,       &D::report_loss,          Phase::waiting},
+    {Phase::offline,     Cue::link_lost,    &D::always,       &D::back_off,             Phase::offline},
+    {Phase::greeting,    Cue::link_lost,    &D::always,       &D::back_off,             Phase::offline},
+    {Phase::configuring, Cue::link_lost,    &D::always,       &D::back_off,             Phase::offline},
+    {Phase::ready,       Cue::link_lost,    &D::always,       &D::report_loss,          Phase::offline},
+    {Phase::exposing,    Cue::link_lost,    &D::always,       &D::report_loss,          Phase::offline},
+    {Phase::computing,   Cue::link_lost,    &D::always,       &D::report_loss,          Phase::offline},
 };
 // clang-format on
 
 PscScanner::PscScanner(ByteLink& link, const Settings& settings)
-    : link_{link},
+    : session_{link,
+               {.connect_timeout = settings.connect_timeout,
+                .first_back_off = settings.first_back_off,
+                .last_back_off = settings.last_back_off,
+                .heartbeat = settings.ping_period,
+                .silent_limit = settings.silent_pings * settings.ping_period,
+                .outbox_bytes = 256}},
       settings_{settings},
       body_(std::max(largest_body(settings.max_stripes, settings.max_points), smallest_body)),
       frame_{settings.max_stripes, settings.max_points} {
@@ -78,7 +82,7 @@ PscScanner::PscScanner(ByteLink& link, const Settings& settings)
 }
 
 std::size_t PscScanner::plan_bytes() const {
-  return sizeof *this + body_.size() + frame_.stripes.size() * sizeof(Stripe) +
+  return sizeof *this + session_.plan_bytes() + body_.size() + frame_.stripes.size() * sizeof(Stripe) +
          frame_.x.size() * (3 * sizeof(float) + sizeof(std::uint8_t));
 }
 
@@ -94,8 +98,8 @@ void PscScanner::cue(Cue what, Instant now) {
 // ---- what the cell asks
 
 void PscScanner::start(Instant now) {
-  if (phase_ == Phase::idle) why_ = "its link is not open yet";
-  cue(Cue::start, now);
+  if (session_.state() == DeviceSession::State::closed) why_ = "its link is not open yet";
+  session_.start(now);
 }
 
 bool PscScanner::trigger(std::uint32_t shot_id, Instant now) {
@@ -112,9 +116,7 @@ void PscScanner::forget_shot() {
 
 ScannerState PscScanner::state() const {
   switch (phase_) {
-    case Phase::idle:
-    case Phase::waiting:
-    case Phase::opening:
+    case Phase::offline:
       return ScannerState::offline;
     case Phase::greeting:
     case Phase::configuring:
@@ -131,19 +133,10 @@ ScannerState PscScanner::state() const {
 
 // ---- actions of the table
 
-void PscScanner::open_link(Instant now) {
-  incoming_ = {};
-  outgoing_size_ = 0;
-  deadline_ = now + settings_.connect_timeout;
-  link_.open();
-}
-
 void PscScanner::back_off(Instant now) {
-  link_.close();
+  session_.lose(now);
   drop_arriving();
   ask_again_at_.reset();
-  back_off_ = back_off_ == 0ns ? settings_.first_back_off : std::min(2 * back_off_, settings_.last_back_off);
-  wait_until_ = now + back_off_;
 }
 
 void PscScanner::report_loss(Instant now) {
@@ -154,7 +147,8 @@ void PscScanner::report_loss(Instant now) {
 }
 
 void PscScanner::greet(Instant now) {
-  heard_at_ = now;
+  incoming_ = {};
+  session_.heard(now);
   deadline_ = now + settings_.greeting_timeout;
   send(HelloRequest{});
 }
@@ -165,8 +159,8 @@ void PscScanner::configure(Instant now) {
 }
 
 void PscScanner::announce(Instant now) {
-  back_off_ = 0ns;
-  pinged_at_ = now;
+  session_.greeted();
+  session_.said(now);
   announced_ = true;
   refused_ = false;
   why_ = "";
@@ -228,16 +222,10 @@ void PscScanner::drop_shot(Instant) {
 // ---- what arrives
 
 void PscScanner::receive(Instant now) {
-  if (phase_ == Phase::idle || phase_ == Phase::waiting) return;
-  const LinkState link = link_.state();
-  if (link == LinkState::lost) {
-    lose(now, link_.why());
-    return;
-  }
-  if (phase_ == Phase::opening) {
-    if (link == LinkState::open) cue(Cue::link_open, now);
-    return;
-  }
+  const DeviceSession::News news = session_.receive();
+  if (news == DeviceSession::News::lost) return lose(now, session_.why());
+  if (news == DeviceSession::News::opened) return cue(Cue::link_open, now);
+  if (!session_.is_open()) return;
   // The bytes of the last frame lie where the next message would go.
   if (packed_ && !arriving_) {
     unpack(settings_.points_a_tick);
@@ -246,7 +234,7 @@ void PscScanner::receive(Instant now) {
   for (std::size_t budget = settings_.bytes_a_tick; budget > 0;) {
     const std::size_t count = read_some(budget);
     if (count == 0) break;
-    heard_at_ = now;
+    session_.heard(now);
     budget -= count;
     if (incoming_.header_have < header_size) continue;
     if (incoming_.payload_offset == 0 && !take_header(now)) return;
@@ -254,7 +242,7 @@ void PscScanner::receive(Instant now) {
         incoming_.head.payload_length == 0 ? 0 : incoming_.head.payload_length + payload_crc_size;
     if (incoming_.body_have < body_size) continue;
     take_message(now);
-    if (phase_ == Phase::waiting) return;  // the message was the connection's last
+    if (!session_.is_open()) return;  // the message was the connection's last
     incoming_ = {};
     if (packed_) return;
   }
@@ -310,20 +298,18 @@ bool PscScanner::is_of_our_shot(const FrameHead& head) const {
 std::size_t PscScanner::read_some(std::size_t budget) {
   if (incoming_.header_have < header_size) {
     const auto room = std::span{incoming_.header}.subspan(incoming_.header_have);
-    const std::size_t count = link_.read(room.first(std::min(room.size(), budget)));
+    const std::size_t count = session_.read(room.first(std::min(room.size(), budget)));
     incoming_.header_have += count;
-    received_ += count;
     return count;
   }
   const std::size_t length = incoming_.head.payload_length;
   const auto room = std::span{body_}.first(length + payload_crc_size).subspan(incoming_.body_have);
   const auto wanted = room.first(std::min(room.size(), budget));
-  const std::size_t count = link_.read(wanted);
+  const std::size_t count = session_.read(wanted);
   if (incoming_.body_have < length) {
     incoming_.crc = crc32c(wanted.first(std::min(count, length - incoming_.body_have)), incoming_.crc);
   }
   incoming_.body_have += count;
-  received_ += count;
   return count;
 }
 
@@ -345,7 +331,7 @@ bool PscScanner::take_header(Instant now) {
     return false;
   }
   incoming_.head = *head;
-  incoming_.payload_offset = received_;
+  incoming_.payload_offset = session_.received();
   return true;
 }
 
@@ -500,18 +486,14 @@ void PscScanner::on_error(std::span<const std::byte> payload, Instant now) {
 
 void PscScanner::transmit(Instant now) {
   watch(now);
-  flush();
+  session_.flush();
 }
 
 void PscScanner::watch(Instant now) {
+  if (session_.transmit(now) == DeviceSession::News::no_connection)
+    return lose(now, "the scanner does not answer the connection request");
   switch (phase_) {
-    case Phase::idle:
-      return;
-    case Phase::waiting:
-      if (now >= wait_until_) cue(Cue::wait_over, now);
-      return;
-    case Phase::opening:
-      if (now >= deadline_) lose(now, "the scanner does not answer the connection request");
+    case Phase::offline:
       return;
     case Phase::greeting:
     case Phase::configuring:
@@ -532,26 +514,18 @@ void PscScanner::watch(Instant now) {
       }
       break;
   }
-  if (now - heard_at_ > settings_.silent_pings * settings_.ping_period) {
-    lose(now, Message::format("the scanner has been silent for {} ms", (now - heard_at_) / 1ms));
-  } else if (now - pinged_at_ >= settings_.ping_period) {
-    pinged_at_ = now;
-    const auto room = std::span{outgoing_}.subspan(outgoing_size_);
-    outgoing_size_ += encode_empty(++request_id_, Type::ping, room);
+  if (session_.is_silent(now)) {
+    lose(now, Message::format("the scanner has been silent for {} ms", session_.silence(now) / 1ms));
+  } else if (session_.heartbeat_due(now)) {
+    session_.said(now);
+    session_.add(encode_empty(++request_id_, Type::ping, session_.room()));
   }
 }
 
 // A request that finds no room is as good as lost on the way; its deadline takes care of it.
 template <typename M>
 void PscScanner::send(const M& message) {
-  outgoing_size_ += encode(++request_id_, message, std::span{outgoing_}.subspan(outgoing_size_));
-}
-
-void PscScanner::flush() {
-  if (outgoing_size_ == 0 || phase_ == Phase::waiting || phase_ == Phase::opening) return;
-  const std::size_t count = link_.write(std::span{outgoing_}.first(outgoing_size_));
-  std::copy(outgoing_.begin() + count, outgoing_.begin() + outgoing_size_, outgoing_.begin());
-  outgoing_size_ -= count;
+  session_.add(encode(++request_id_, message, session_.room()));
 }
 
 void PscScanner::lose(Instant now, const Message& why) {

@@ -11,7 +11,7 @@
 #pragma once
 
 #include "hal/base/event_queue.hpp"
-#include "hal/links/byte_link.hpp"
+#include "hal/links/device_session.hpp"
 #include "hal/scanner/psc1.hpp"
 #include "hal/scanner/scanner.hpp"
 
@@ -75,10 +75,8 @@ class PscScanner final : public Scanner {
   std::size_t plan_bytes() const override;
 
  private:
-  enum class Phase { idle, waiting, opening, greeting, configuring, ready, exposing, computing };
+  enum class Phase { offline, greeting, configuring, ready, exposing, computing };
   enum class Cue {
-    start,
-    wait_over,
     link_open,
     link_lost,
     greeted,
@@ -127,8 +125,6 @@ class PscScanner final : public Scanner {
   bool same_session() const MOLDLOFT_NONBLOCKING { return shot_.session_id == info_.session_id; }
 
   // actions
-  void nothing(Instant) MOLDLOFT_NONBLOCKING {}
-  void open_link(Instant now) MOLDLOFT_NONBLOCKING;
   void back_off(Instant now) MOLDLOFT_NONBLOCKING;
   void report_loss(Instant now) MOLDLOFT_NONBLOCKING;
   void greet(Instant now) MOLDLOFT_NONBLOCKING;
@@ -157,7 +153,6 @@ class PscScanner final : public Scanner {
   bool is_of_our_shot(const psc1::FrameHead&) const;
 
   void watch(Instant now);
-  void flush();
   void lose(Instant now, const Message& why);
   void refuse(Instant now, const Message& why);
   std::optional<Message> unfit(const psc1::HelloReply&) const;
@@ -167,28 +162,22 @@ class PscScanner final : public Scanner {
   template <typename M>
   void send(const M& message);
 
-  ByteLink& link_;
+  DeviceSession session_;
   const Settings settings_;
   std::vector<std::byte> body_;
   Frame frame_;
   ScannerInfo info_;
   Incoming incoming_;
-  std::array<std::byte, 256> outgoing_{};
-  std::size_t outgoing_size_ = 0;
   EventQueue<ScannerEvent, 16> events_;
 
-  Phase phase_ = Phase::idle;
+  Phase phase_ = Phase::offline;
   Shot shot_;
   bool announced_ = false;               // ready was reported and not taken back by lost
   bool refused_ = false;                 // unfit was reported, and ready not since then
   bool was_busy_ = false;                // the present attempt was answered by BUSY
-  Instant wait_until_{0};                // end of the back-off
   Instant deadline_{0};                  // of the answer that the phase waits for
   std::optional<Instant> ask_again_at_;  // after BUSY
-  Instant heard_at_{0}, pinged_at_{0};
-  Duration back_off_{0};
   std::uint32_t request_id_ = 0;
-  std::uint64_t received_ = 0;             // all bytes ever read from the link
   std::optional<psc1::FrameHead> packed_;  // of the frame in body_ whose points are not all in frame_
   bool arriving_ = false;                  // it is the message on its way
   std::size_t unpacked_ = 0;               // points that are in frame_
