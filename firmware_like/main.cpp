@@ -115,7 +115,7 @@ int run_command_line(int argc, char** argv) {
   if (*latency_command) return measure_latency(latency);
   if (*report_command) return report_run(report);
   if (*machines_command) {
-    show(machine_diagrams());
+    show(cell_diagrams() + "\n" + driver_diagrams());
     return exit_done;
   }
   return exit_failed;

@@ -1,5 +1,7 @@
 #include "firmware_like/commands/machines.hpp"
 
+#include "hal/robot/line_table.hpp"
+#include "hal/scanner/psc_table.hpp"
 #include "tasks/machines/boundary_tracker.hpp"
 #include "tasks/machines/cell_state.hpp"
 #include "tasks/machines/shot_sequence.hpp"
@@ -31,36 +33,6 @@ struct Machine {
   std::vector<Row> rows;            // in the order of the table
 };
 
-template <typename Context>
-std::string budget_of(bool (*guard)(const Context&)) {
-  return guard(Context{}) ? "" : "?";
-}
-
-// A context whose counters are all used up, and then one of them not.
-template <>
-std::string budget_of(bool (*guard)(const tasks::TrackContext&)) {
-  using Context = tasks::TrackContext;
-  if (guard(Context{})) return "";
-  const std::pair<int Context::*, const char*> limits[] = {
-      {&Context::max_seek_steps, "steps left"},
-      {&Context::max_turns, "turns left"},
-      {&Context::max_backs, "steps back left"},
-  };
-  std::string text;
-  for (const auto& [limit, name] : limits) {
-    Context context;
-    context.*limit = 1;
-    if (guard(context)) text += (text.empty() ? "" : " or ") + std::string{name};
-  }
-  return text.empty() ? "?" : text;
-}
-
-template <>
-std::string budget_of(bool (*guard)(const tasks::CellContext&)) {
-  const bool before = guard({.begun = false}), after = guard({.begun = true});
-  return before && after ? "" : before ? "not begun" : "begun";
-}
-
 template <typename State, typename Table>
 Machine machine_of(Table table, int state_count) {
   Machine machine;
@@ -68,7 +40,7 @@ Machine machine_of(Table table, int state_count) {
   for (const auto& row : table) {
     Row r{.from = std::string{to_string(row.from)},
           .event = std::string{to_string(row.on)},
-          .guard = budget_of(row.guard),
+          .guard = std::string{row.guard.name},
           .action = std::string{to_string(row.action)},
           .to = std::string{to_string(row.to)}};
     const bool has_rival = std::ranges::any_of(
@@ -167,13 +139,20 @@ std::string diagram(const Machine& machine) {
 
 }  // namespace
 
-std::string machine_diagrams() {
+std::string driver_diagrams() {
+  const auto scanner = machine_of<hal::PscPhase>(hal::psc_transitions(), hal::psc_phase_count);
+  const auto robot = machine_of<hal::LinePhase>(hal::line_transitions(), hal::line_phase_count);
+  return fmt::format("### PSC1 scanner (`scanner/psc_table.cpp`)\n\n{}\n", diagram(scanner)) +
+         fmt::format("### Line robot (`robot/line_table.cpp`)\n\n{}", diagram(robot));
+}
+
+std::string cell_diagrams() {
   const auto cell = machine_of<tasks::CellState>(tasks::cell_transitions(), tasks::cell_state_count);
   const auto shots = machine_of<tasks::ShotState>(tasks::shot_transitions(), tasks::shot_state_count);
   const auto tracker = machine_of<tasks::TrackState>(tasks::track_transitions(), tasks::track_state_count);
-  return fmt::format("### Supervisor (`cell_state.cpp`)\n\n{}\n", diagram(cell)) +
-         fmt::format("### Shot sequence (`shot_sequence.cpp`)\n\n{}\n", diagram(shots)) +
-         fmt::format("### Boundary tracker (`track_table.cpp`)\n\n{}", diagram(tracker));
+  return fmt::format("### Supervisor (`machines/cell_state.cpp`)\n\n{}\n", diagram(cell)) +
+         fmt::format("### Shot sequence (`machines/shot_sequence.cpp`)\n\n{}\n", diagram(shots)) +
+         fmt::format("### Boundary tracker (`machines/track_table.cpp`)\n\n{}", diagram(tracker));
 }
 
 }  // namespace moldloft::firmware_like

@@ -59,76 +59,6 @@ Message text_of_error(int code) {
 
 }  // namespace
 
-struct LineRobot::Transition {
-  Phase from;
-  Cue cue;
-  bool (LineRobot::*guard)() const MOLDLOFT_NONBLOCKING;
-  void (LineRobot::*action)(Instant) MOLDLOFT_NONBLOCKING;
-  Phase to;
-};
-
-using D = LineRobot;
-
-// First match counts; a pair that is not listed is ignored (an answer that comes twice, a reset
-// where none is needed).
-// clang-format off
-const LineRobot::Transition LineRobot::transitions[] = {
-    // from            cue                guard            action                       to
-    {Phase::offline,   Cue::link_open,    &D::is_latched,  &D::nothing,                 Phase::faulted},
-    {Phase::offline,   Cue::link_open,    &D::always,      &D::start_sync,              Phase::syncing},
-    {Phase::syncing,   Cue::synced,       &D::always,      &D::ask_status,              Phase::checking},
-    {Phase::syncing,   Cue::late,         &D::always,      &D::send_syn,                Phase::syncing},
-    {Phase::checking,  Cue::stands_still, &D::always,      &D::ask_pose,                Phase::locating},
-    {Phase::checking,  Cue::in_motion,    &D::always,      &D::send_stop_and_wait,      Phase::checking},
-    {Phase::checking,  Cue::late,         &D::always,      &D::ask_status,              Phase::checking},
-    {Phase::locating,  Cue::located,      &D::always,      &D::announce,                Phase::ready},
-    {Phase::locating,  Cue::late,         &D::always,      &D::ask_pose,                Phase::locating},
-    {Phase::ready,     Cue::command,      &D::always,      &D::send_command,            Phase::commanded},
-    {Phase::commanded, Cue::acked,        &D::always,      &D::report_moving,           Phase::moving},
-    {Phase::commanded, Cue::in_motion,    &D::always,      &D::report_moving,           Phase::moving},
-    {Phase::commanded, Cue::done,         &D::always,      &D::report_done,             Phase::ready},
-    {Phase::commanded, Cue::error,        &D::always,      &D::report_refused,          Phase::ready},
-    {Phase::commanded, Cue::late,         &D::is_stopping, &D::ask_status,              Phase::commanded},
-    {Phase::commanded, Cue::late,         &D::has_resends, &D::resend_command,          Phase::commanded},
-    {Phase::commanded, Cue::late,         &D::always,      &D::ask_status,              Phase::commanded},
-    {Phase::commanded, Cue::stands_still, &D::has_stopped, &D::report_stopped_and_sync, Phase::syncing},
-    {Phase::commanded, Cue::stands_still, &D::is_stopping, &D::nothing,                 Phase::commanded},
-    {Phase::commanded, Cue::stands_still, &D::has_resends, &D::nothing,                 Phase::commanded},
-    {Phase::commanded, Cue::stands_still, &D::always,      &D::resend_afresh,           Phase::commanded},
-    {Phase::moving,    Cue::acked,        &D::always,      &D::await_done,              Phase::moving},
-    {Phase::moving,    Cue::done,         &D::always,      &D::report_done,             Phase::ready},
-    {Phase::moving,    Cue::error,        &D::always,      &D::report_refused,          Phase::ready},
-    {Phase::moving,    Cue::late,         &D::always,      &D::resend_command,          Phase::moving},
-    {Phase::moving,    Cue::stands_still, &D::always,      &D::resend_command,          Phase::moving},
-    {Phase::checking,  Cue::fault,        &D::always,      &D::report_fault,            Phase::faulted},
-    {Phase::locating,  Cue::fault,        &D::always,      &D::report_fault,            Phase::faulted},
-    {Phase::ready,     Cue::fault,        &D::always,      &D::report_fault,            Phase::faulted},
-    {Phase::commanded, Cue::fault,        &D::always,      &D::report_fault,            Phase::faulted},
-    {Phase::moving,    Cue::fault,        &D::always,      &D::report_fault,            Phase::faulted},
-    {Phase::offline,   Cue::reset,        &D::always,      &D::unlatch,                 Phase::offline},
-    {Phase::syncing,   Cue::reset,        &D::always,      &D::start_sync,              Phase::syncing},
-    {Phase::checking,  Cue::reset,        &D::always,      &D::start_sync,              Phase::syncing},
-    {Phase::locating,  Cue::reset,        &D::always,      &D::start_sync,              Phase::syncing},
-    {Phase::ready,     Cue::reset,        &D::always,      &D::start_sync,              Phase::syncing},
-    {Phase::commanded, Cue::reset,        &D::always,      &D::start_sync,              Phase::syncing},
-    {Phase::moving,    Cue::reset,        &D::always,      &D::start_sync,              Phase::syncing},
-    {Phase::faulted,   Cue::reset,        &D::always,      &D::start_sync,              Phase::syncing},
-    {Phase::checking,  Cue::silent,       &D::always,      &D::report_silence,          Phase::syncing},
-    {Phase::locating,  Cue::silent,       &D::always,      &D::report_silence,          Phase::syncing},
-    {Phase::ready,     Cue::silent,       &D::always,      &D::report_silence,          Phase::syncing},
-    {Phase::commanded, Cue::silent,       &D::always,      &D::report_silence,          Phase::syncing},
-    {Phase::moving,    Cue::silent,       &D::always,      &D::report_silence,          Phase::syncing},
-    {Phase::offline,   Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
-    {Phase::syncing,   Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
-    {Phase::checking,  Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
-    {Phase::locating,  Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
-    {Phase::ready,     Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
-    {Phase::commanded, Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
-    {Phase::moving,    Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
-    {Phase::faulted,   Cue::link_lost,    &D::always,      &D::report_loss,             Phase::offline},
-};
-// clang-format on
-
 LineRobot::LineRobot(ByteLink& link, const Settings& settings)
     : session_{link,
                {.connect_timeout = settings.connect_timeout,
@@ -145,12 +75,17 @@ LineRobot::LineRobot(ByteLink& link, const Settings& settings)
 }
 
 void LineRobot::cue(Cue what, Instant now) {
-  for (const Transition& t : transitions) {
-    if (t.from != phase_ || t.cue != what || !(this->*t.guard)()) continue;
-    phase_ = t.to;
-    (this->*t.action)(now);
-    return;
-  }
+  const auto* row = find_transition(line_transitions(), phase_, what, context());
+  if (row == nullptr) return;
+  phase_ = row->to;
+  carry_out(row->action, now);
+}
+
+LineContext LineRobot::context() const {
+  return {.latched = latched_,
+          .stopping = stop_requested_,
+          .stop_known = !stop_wanted_,
+          .has_resends = resends_ < settings_.resends};
 }
 
 // ---- what the cell asks
@@ -209,6 +144,52 @@ RobotState LineRobot::state() const {
 
 // ---- actions of the table
 
+void LineRobot::carry_out(LineAction action, Instant now) {
+  switch (action) {
+    case LineAction::none:
+      return;
+    case LineAction::report_loss:
+      return report_loss(now);
+    case LineAction::report_silence:
+      return report_silence(now);
+    case LineAction::start_sync:
+      return start_sync(now);
+    case LineAction::send_syn:
+      return send_syn(now);
+    case LineAction::ask_status:
+      return ask_status(now);
+    case LineAction::send_stop:
+      return send_stop(now);
+    case LineAction::ask_pose:
+      return ask_pose(now);
+    case LineAction::announce:
+      return announce();
+    case LineAction::send_command:
+      return send_command(now);
+    case LineAction::resend_command:
+      return resend_command(now);
+    case LineAction::resend_afresh:
+      // The robot is there and stands, yet no answer came: nothing but a bad line explains it, and the line may go on.
+      resends_ = 0;
+      return resend_command(now);
+    case LineAction::report_moving:
+      return report_moving();
+    case LineAction::await_done:
+      return await_done();
+    case LineAction::report_done:
+      return report_done();
+    case LineAction::report_refused:
+      return report_refused();
+    case LineAction::report_stopped_and_sync:
+      return report_stopped_and_sync(now);
+    case LineAction::report_fault:
+      return report_fault();
+    case LineAction::unlatch:
+      latched_ = false;
+      return;
+  }
+}
+
 void LineRobot::report_loss(Instant now) {
   if (std::exchange(announced_, false))
     events_.push({.kind = RobotEvent::Kind::lost, .pose = pose_, .text = why_});
@@ -243,7 +224,7 @@ void LineRobot::ask_status(Instant now) {
   ask(Verb::sta, now);
 }
 
-void LineRobot::send_stop_and_wait(Instant now) {
+void LineRobot::send_stop(Instant now) {
   why_ = "the robot says that it moves; STP was sent, and no motion before it stands";
   answer_due_ = now + answer_time_;
   ask(Verb::stp, now);
@@ -254,7 +235,7 @@ void LineRobot::ask_pose(Instant now) {
   ask(Verb::pos, now);
 }
 
-void LineRobot::announce(Instant) {
+void LineRobot::announce() {
   session_.greeted();
   announced_ = true;
   why_ = "";
@@ -279,25 +260,18 @@ void LineRobot::resend_command(Instant now) {
   send(command_, now);
 }
 
-// The robot is there and stands, yet no answer came: nothing but a bad line explains it, and the line
-// may go on.
-void LineRobot::resend_afresh(Instant now) {
-  resends_ = 0;
-  resend_command(now);
-}
-
-void LineRobot::report_moving(Instant now) {
-  await_done(now);
+void LineRobot::report_moving() {
+  await_done();
   events_.push({.kind = RobotEvent::Kind::moving, .pose = pose_, .text = {}});
 }
 
-void LineRobot::await_done(Instant) { answer_due_ = never; }
+void LineRobot::await_done() { answer_due_ = never; }
 
-void LineRobot::report_done(Instant) {
+void LineRobot::report_done() {
   events_.push({.kind = RobotEvent::Kind::done, .pose = pose_, .calibrated = true, .text = {}});
 }
 
-void LineRobot::report_refused(Instant) {
+void LineRobot::report_refused() {
   events_.push(
       {.kind = RobotEvent::Kind::refused, .pose = pose_, .code = code_, .text = text_of_error(code_)});
 }
@@ -306,17 +280,15 @@ void LineRobot::report_refused(Instant) {
 // SYN settles both.
 void LineRobot::report_stopped_and_sync(Instant now) {
   code_ = std::to_underlying(Error::stopped);
-  report_refused(now);
+  report_refused();
   start_sync(now);
 }
 
-void LineRobot::report_fault(Instant) {
+void LineRobot::report_fault() {
   latched_ = true;
   why_ = text_;
   events_.push({.kind = RobotEvent::Kind::fault, .pose = pose_, .code = code_, .text = text_});
 }
-
-void LineRobot::unlatch(Instant) { latched_ = false; }
 
 // ---- what arrives
 

@@ -2,7 +2,7 @@
 //
 //     link open -> SYN -> STA -> POS -> ready -> MOV or CAL -> ACK -> DON -> ready
 //
-// The way through it is the table in line_robot.cpp. A command has one number for its whole life and is
+// The way through it is the table in line_table.cpp. A command has one number for its whole life and is
 // repeated as the same line until its fate is known; a robot that keeps PROTOCOLS.md moves once for a number,
 // however often it comes. What cannot be known that way (robot restarted, link gone for good) is never asked
 // again: the command is given up, and after SYN the cell learns from `ready` where the arm stands.
@@ -12,6 +12,7 @@
 
 #include "hal/base/event_queue.hpp"
 #include "hal/links/device_session.hpp"
+#include "hal/robot/line_table.hpp"
 #include "hal/robot/robot.hpp"
 #include "hal/robot/robot_line.hpp"
 
@@ -62,55 +63,30 @@ class LineRobot final : public Robot {
   static constexpr std::size_t shown_of_line =
       40;  // of a line in a message: verb and fields, with room for the reason
 
-  enum class Phase { offline, syncing, checking, locating, ready, commanded, moving, faulted };
-  enum class Cue {
-    link_open,
-    link_lost,
-    silent,
-    synced,
-    in_motion,
-    stands_still,
-    located,
-    command,
-    acked,
-    done,
-    error,
-    late,
-    fault,
-    reset
-  };
-  struct Transition;
-  static const Transition transitions[];
+  using Phase = LinePhase;
+  using Cue = LineCue;
 
   void cue(Cue, Instant now);
-
-  // guards
-  bool always() const MOLDLOFT_NONBLOCKING { return true; }
-  bool has_resends() const MOLDLOFT_NONBLOCKING { return resends_ < settings_.resends; }
-  bool is_latched() const MOLDLOFT_NONBLOCKING { return latched_; }
-  bool is_stopping() const MOLDLOFT_NONBLOCKING { return stop_requested_; }
-  bool has_stopped() const MOLDLOFT_NONBLOCKING { return stop_requested_ && !stop_wanted_; }
+  LineContext context() const MOLDLOFT_NONBLOCKING;
+  void carry_out(LineAction, Instant now) MOLDLOFT_NONBLOCKING;
 
   // actions
-  void nothing(Instant) MOLDLOFT_NONBLOCKING {}
   void report_loss(Instant now) MOLDLOFT_NONBLOCKING;
   void report_silence(Instant now) MOLDLOFT_NONBLOCKING;
   void start_sync(Instant now) MOLDLOFT_NONBLOCKING;
   void send_syn(Instant now) MOLDLOFT_NONBLOCKING;
   void ask_status(Instant now) MOLDLOFT_NONBLOCKING;
-  void send_stop_and_wait(Instant now) MOLDLOFT_NONBLOCKING;
+  void send_stop(Instant now) MOLDLOFT_NONBLOCKING;
   void ask_pose(Instant now) MOLDLOFT_NONBLOCKING;
-  void announce(Instant now) MOLDLOFT_NONBLOCKING;
+  void announce() MOLDLOFT_NONBLOCKING;
   void send_command(Instant now) MOLDLOFT_NONBLOCKING;
   void resend_command(Instant now) MOLDLOFT_NONBLOCKING;
-  void resend_afresh(Instant now) MOLDLOFT_NONBLOCKING;
-  void report_moving(Instant now) MOLDLOFT_NONBLOCKING;
-  void await_done(Instant now) MOLDLOFT_NONBLOCKING;
-  void report_done(Instant now) MOLDLOFT_NONBLOCKING;
-  void report_refused(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_moving() MOLDLOFT_NONBLOCKING;
+  void await_done() MOLDLOFT_NONBLOCKING;
+  void report_done() MOLDLOFT_NONBLOCKING;
+  void report_refused() MOLDLOFT_NONBLOCKING;
   void report_stopped_and_sync(Instant now) MOLDLOFT_NONBLOCKING;
-  void report_fault(Instant now) MOLDLOFT_NONBLOCKING;
-  void unlatch(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_fault() MOLDLOFT_NONBLOCKING;
 
   // what arrives
   void take_bytes(std::span<const std::byte> bytes, Instant now);

@@ -25,48 +25,6 @@ constexpr std::size_t smallest_body = 4096;
 
 }  // namespace
 
-struct PscScanner::Transition {
-  Phase from;
-  Cue cue;
-  bool (PscScanner::*guard)() const MOLDLOFT_NONBLOCKING;
-  void (PscScanner::*action)(Instant) MOLDLOFT_NONBLOCKING;
-  Phase to;
-};
-
-using D = PscScanner;
-
-// First match counts; a pair that is not listed is ignored (a late answer to a question
-// that nobody asks any more).
-// clang-format off
-const PscScanner::Transition PscScanner::transitions[] = {
-    // from              cue                guard             action                    to
-    {Phase::offline,     Cue::link_open,    &D::always,       &D::greet,                Phase::greeting},
-    {Phase::greeting,    Cue::greeted,      &D::always,       &D::configure,            Phase::configuring},
-    {Phase::configuring, Cue::configured,   &D::shot_waits,   &D::announce_and_trigger, Phase::exposing},
-    {Phase::configuring, Cue::configured,   &D::frame_waits,  &D::announce_and_trigger, Phase::computing},
-    {Phase::configuring, Cue::configured,   &D::shot_is_void, &D::announce_and_fail,    Phase::ready},
-    {Phase::configuring, Cue::configured,   &D::always,       &D::announce,             Phase::ready},
-    {Phase::ready,       Cue::triggered,    &D::always,       &D::send_trigger,         Phase::exposing},
-    {Phase::exposing,    Cue::exposed,      &D::always,       &D::report_exposed,       Phase::computing},
-    {Phase::exposing,    Cue::frame,        &D::always,       &D::report_both,          Phase::ready},
-    {Phase::exposing,    Cue::late,         &D::has_retries,  &D::send_trigger,         Phase::exposing},
-    {Phase::exposing,    Cue::late,         &D::always,       &D::fail_shot,            Phase::ready},
-    {Phase::exposing,    Cue::exposed_anew, &D::always,       &D::fail_shot,            Phase::ready},
-    {Phase::exposing,    Cue::forgotten,    &D::always,       &D::drop_shot,            Phase::ready},
-    {Phase::computing,   Cue::frame,        &D::always,       &D::report_frame,         Phase::ready},
-    {Phase::computing,   Cue::late,         &D::has_retries,  &D::send_trigger,         Phase::computing},
-    {Phase::computing,   Cue::late,         &D::always,       &D::fail_shot,            Phase::ready},
-    {Phase::computing,   Cue::exposed_anew, &D::always,       &D::fail_shot,            Phase::ready},
-    {Phase::computing,   Cue::forgotten,    &D::always,       &D::drop_shot,            Phase::ready},
-    {Phase::offline,     Cue::link_lost,    &D::always,       &D::back_off,             Phase::offline},
-    {Phase::greeting,    Cue::link_lost,    &D::always,       &D::back_off,             Phase::offline},
-    {Phase::configuring, Cue::link_lost,    &D::always,       &D::back_off,             Phase::offline},
-    {Phase::ready,       Cue::link_lost,    &D::always,       &D::report_loss,          Phase::offline},
-    {Phase::exposing,    Cue::link_lost,    &D::always,       &D::report_loss,          Phase::offline},
-    {Phase::computing,   Cue::link_lost,    &D::always,       &D::report_loss,          Phase::offline},
-};
-// clang-format on
-
 PscScanner::PscScanner(ByteLink& link, const Settings& settings)
     : session_{link,
                {.connect_timeout = settings.connect_timeout,
@@ -87,12 +45,17 @@ std::size_t PscScanner::plan_bytes() const {
 }
 
 void PscScanner::cue(Cue what, Instant now) {
-  for (const Transition& t : transitions) {
-    if (t.from != phase_ || t.cue != what || !(this->*t.guard)()) continue;
-    phase_ = t.to;
-    (this->*t.action)(now);
-    return;
-  }
+  const auto* row = find_transition(psc_transitions(), phase_, what, context());
+  if (row == nullptr) return;
+  phase_ = row->to;
+  carry_out(row->action, now);
+}
+
+PscContext PscScanner::context() const {
+  return {.has_retries = shot_.attempts <= settings_.retries,
+          .outstanding = shot_.outstanding,
+          .exposed = shot_.exposed,
+          .same_session = shot_.session_id == info_.session_id};
 }
 
 // ---- what the cell asks
@@ -133,6 +96,41 @@ ScannerState PscScanner::state() const {
 
 // ---- actions of the table
 
+void PscScanner::carry_out(PscAction action, Instant now) {
+  switch (action) {
+    case PscAction::back_off:
+      return back_off(now);
+    case PscAction::report_loss:
+      return report_loss(now);
+    case PscAction::greet:
+      return greet(now);
+    case PscAction::configure:
+      return configure(now);
+    case PscAction::announce:
+      return announce(now);
+    case PscAction::announce_and_trigger:
+      announce(now);
+      return send_trigger(now);
+    case PscAction::announce_and_fail:
+      announce(now);
+      explain_void_shot();
+      return fail_shot();
+    case PscAction::send_trigger:
+      return send_trigger(now);
+    case PscAction::report_exposed:
+      return report_exposed(now);
+    case PscAction::report_frame:
+      return report_frame();
+    case PscAction::report_both:
+      report_exposed(now);
+      return report_frame();
+    case PscAction::fail_shot:
+      return fail_shot();
+    case PscAction::drop_shot:
+      return drop_shot();
+  }
+}
+
 void PscScanner::back_off(Instant now) {
   session_.lose(now);
   drop_arriving();
@@ -167,17 +165,9 @@ void PscScanner::announce(Instant now) {
   events_.push({ScannerEvent::Kind::ready, 0, {}});
 }
 
-void PscScanner::announce_and_trigger(Instant now) {
-  announce(now);
-  send_trigger(now);
-}
-
-void PscScanner::announce_and_fail(Instant now) {
-  announce(now);
-  if (shot_.exposed && !same_session()) {
+void PscScanner::explain_void_shot() {
+  if (shot_.exposed && shot_.session_id != info_.session_id)
     failure_ = "the scanner restarted between EXPOSED and FRAME; the arm may have moved since";
-  }
-  fail_shot(now);
 }
 
 void PscScanner::send_trigger(Instant now) {
@@ -196,25 +186,20 @@ void PscScanner::report_exposed(Instant now) {
   events_.push({ScannerEvent::Kind::exposed, shot_.id, {}});
 }
 
-void PscScanner::report_frame(Instant) {
+void PscScanner::report_frame() {
   shot_.outstanding = false;
   ask_again_at_.reset();
   events_.push({ScannerEvent::Kind::frame, shot_.id, {}});
 }
 
-void PscScanner::report_both(Instant now) {
-  report_exposed(now);
-  report_frame(now);
-}
-
-void PscScanner::fail_shot(Instant) {
+void PscScanner::fail_shot() {
   shot_.outstanding = false;
   drop_arriving();
   ask_again_at_.reset();
   events_.push({ScannerEvent::Kind::shot_failed, shot_.id, failure_});
 }
 
-void PscScanner::drop_shot(Instant) {
+void PscScanner::drop_shot() {
   ask_again_at_.reset();
   drop_arriving();
 }

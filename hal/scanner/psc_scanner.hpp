@@ -2,7 +2,7 @@
 //
 //     link open -> HELLO -> CONFIG -> ready -> TRIGGER -> EXPOSED -> FRAME -> ready
 //
-// The way through it is the table in psc_scanner.cpp. A shot is repeated under its own id, so nothing is
+// The way through it is the table in psc_table.cpp. A shot is repeated under its own id, so nothing is
 // exposed twice for one shot. One case the driver cannot mend: the sensor restarts (new session) between
 // EXPOSED and FRAME. The arm may have left by then, a second exposure would be of another place: such a shot
 // fails and the cell plans it again.
@@ -13,6 +13,7 @@
 #include "hal/base/event_queue.hpp"
 #include "hal/links/device_session.hpp"
 #include "hal/scanner/psc1.hpp"
+#include "hal/scanner/psc_table.hpp"
 #include "hal/scanner/scanner.hpp"
 
 #include <array>
@@ -75,21 +76,8 @@ class PscScanner final : public Scanner {
   std::size_t plan_bytes() const override;
 
  private:
-  enum class Phase { offline, greeting, configuring, ready, exposing, computing };
-  enum class Cue {
-    link_open,
-    link_lost,
-    greeted,
-    configured,
-    triggered,
-    exposed,
-    exposed_anew,
-    frame,
-    late,
-    forgotten
-  };
-  struct Transition;
-  static const Transition transitions[];
+  using Phase = PscPhase;
+  using Cue = PscCue;
 
   struct Shot {
     std::uint32_t id = 0;
@@ -111,18 +99,8 @@ class PscScanner final : public Scanner {
   };
 
   void cue(Cue, Instant now);
-
-  // guards
-  bool always() const MOLDLOFT_NONBLOCKING { return true; }
-  bool has_retries() const MOLDLOFT_NONBLOCKING { return shot_.attempts <= settings_.retries; }
-  bool shot_waits() const MOLDLOFT_NONBLOCKING {
-    return shot_.outstanding && !shot_.exposed && has_retries();
-  }
-  bool frame_waits() const MOLDLOFT_NONBLOCKING {
-    return shot_.outstanding && shot_.exposed && has_retries() && same_session();
-  }
-  bool shot_is_void() const MOLDLOFT_NONBLOCKING { return shot_.outstanding; }
-  bool same_session() const MOLDLOFT_NONBLOCKING { return shot_.session_id == info_.session_id; }
+  PscContext context() const MOLDLOFT_NONBLOCKING;
+  void carry_out(PscAction, Instant now) MOLDLOFT_NONBLOCKING;
 
   // actions
   void back_off(Instant now) MOLDLOFT_NONBLOCKING;
@@ -130,14 +108,12 @@ class PscScanner final : public Scanner {
   void greet(Instant now) MOLDLOFT_NONBLOCKING;
   void configure(Instant now) MOLDLOFT_NONBLOCKING;
   void announce(Instant now) MOLDLOFT_NONBLOCKING;
-  void announce_and_trigger(Instant now) MOLDLOFT_NONBLOCKING;
-  void announce_and_fail(Instant now) MOLDLOFT_NONBLOCKING;
+  void explain_void_shot() MOLDLOFT_NONBLOCKING;
   void send_trigger(Instant now) MOLDLOFT_NONBLOCKING;
   void report_exposed(Instant now) MOLDLOFT_NONBLOCKING;
-  void report_frame(Instant now) MOLDLOFT_NONBLOCKING;
-  void report_both(Instant now) MOLDLOFT_NONBLOCKING;  // EXPOSED and FRAME in one
-  void fail_shot(Instant now) MOLDLOFT_NONBLOCKING;
-  void drop_shot(Instant now) MOLDLOFT_NONBLOCKING;
+  void report_frame() MOLDLOFT_NONBLOCKING;
+  void fail_shot() MOLDLOFT_NONBLOCKING;
+  void drop_shot() MOLDLOFT_NONBLOCKING;
 
   // what arrives
   std::size_t read_some(std::size_t budget);

@@ -16,7 +16,7 @@
 #include "geometry/rigid_motion.hpp"
 #include "hal/base/fixed_text.hpp"
 #include "hal/base/realtime.hpp"
-#include "tasks/machines/transition.hpp"
+#include "hal/base/transition.hpp"
 
 #include <Eigen/Core>
 
@@ -70,9 +70,9 @@ struct TrackContext {
   int max_seek_steps = 0, max_turns = 0, max_backs = 0;
 };
 
-using TrackTransition = Transition<TrackState, TrackEvent, TrackAction, TrackContext>;
+using TrackTransition = hal::Transition<TrackState, TrackEvent, TrackAction, TrackContext>;
 std::span<const TrackTransition> track_transitions() MOLDLOFT_NONBLOCKING;
-std::span<const Ignored<TrackState, TrackEvent>> track_ignored();
+std::span<const hal::Ignored<TrackState, TrackEvent>> track_ignored();
 std::string_view to_string(TrackState) MOLDLOFT_NONBLOCKING;
 std::string_view to_string(TrackEvent) MOLDLOFT_NONBLOCKING;
 std::string_view to_string(TrackAction) MOLDLOFT_NONBLOCKING;

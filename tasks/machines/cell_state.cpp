@@ -8,10 +8,11 @@ namespace {
 using S = CellState;
 using E = CellEvent;
 using A = CellAction;
-constexpr auto any = always<CellContext>;
+constexpr auto any = hal::always<CellContext>;
 
 // Held since the start: nothing is connected, nothing calibrated, nothing to go on with yet.
-constexpr bool not_begun(const CellContext& c) MOLDLOFT_NONBLOCKING { return !c.begun; }
+constexpr hal::Guard<CellContext> not_begun{
+    "not begun", [](const CellContext& c) MOLDLOFT_NONBLOCKING { return !c.begun; }};
 
 // clang-format off
 constexpr CellTransition table[] = {
@@ -61,7 +62,7 @@ constexpr CellTransition table[] = {
 };
 
 // Commands that a line controller may send at any time and that mean nothing just now.
-constexpr Ignored<S, E> ignored[] = {
+constexpr hal::Ignored<S, E> ignored[] = {
     {S::idle, E::hold},       {S::idle, E::unhold},       {S::idle, E::clear},       {S::idle, E::reset},       {S::idle, E::done},
     {S::starting, E::start},  {S::starting, E::hold},     {S::starting, E::unhold},  {S::starting, E::clear},   {S::starting, E::reset},
     {S::execute, E::start},   {S::execute, E::unhold},    {S::execute, E::clear},    {S::execute, E::reset},
@@ -97,7 +98,7 @@ constexpr std::array<std::string_view, 6> phase_names = {
 }  // namespace
 
 std::span<const CellTransition> cell_transitions() { return table; }
-std::span<const Ignored<CellState, CellEvent>> cell_ignored() { return ignored; }
+std::span<const hal::Ignored<CellState, CellEvent>> cell_ignored() { return ignored; }
 
 std::string_view to_string(CellState s) { return state_names[static_cast<std::size_t>(s)]; }
 std::string_view to_string(CellEvent e) { return event_names[static_cast<std::size_t>(e)]; }

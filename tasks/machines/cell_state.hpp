@@ -3,7 +3,7 @@
 #pragma once
 
 #include "hal/base/realtime.hpp"
-#include "tasks/machines/transition.hpp"
+#include "hal/base/transition.hpp"
 
 #include <cstdint>
 #include <span>
@@ -61,9 +61,9 @@ struct CellContext {
   bool begun = false;  // Starting was entered: devices are connected, the arm is calibrated
 };
 
-using CellTransition = Transition<CellState, CellEvent, CellAction, CellContext>;
+using CellTransition = hal::Transition<CellState, CellEvent, CellAction, CellContext>;
 std::span<const CellTransition> cell_transitions() MOLDLOFT_NONBLOCKING;
-std::span<const Ignored<CellState, CellEvent>> cell_ignored();
+std::span<const hal::Ignored<CellState, CellEvent>> cell_ignored();
 
 std::string_view to_string(CellState) MOLDLOFT_NONBLOCKING;
 std::string_view to_string(CellEvent) MOLDLOFT_NONBLOCKING;

@@ -8,7 +8,7 @@ namespace {
 using S = ShotState;
 using E = ShotEvent;
 using A = ShotAction;
-constexpr auto any = always<ShotContext>;
+constexpr auto any = hal::always<ShotContext>;
 
 // clang-format off
 constexpr ShotTransition table[] = {
@@ -30,7 +30,7 @@ constexpr ShotTransition table[] = {
     {S::in_place_computing,  E::failed,   any,   A::give_up,               S::in_place},
 };
 
-constexpr Ignored<S, E> ignored[] = {
+constexpr hal::Ignored<S, E> ignored[] = {
     {S::parked, E::arrived}, {S::parked, E::clear}, {S::parked, E::exposed}, {S::parked, E::frame}, {S::parked, E::failed},
     {S::driving, E::order}, {S::driving, E::clear}, {S::driving, E::exposed}, {S::driving, E::frame}, {S::driving, E::failed},
     {S::in_place, E::order}, {S::in_place, E::arrived}, {S::in_place, E::exposed}, {S::in_place, E::frame}, {S::in_place, E::failed},
@@ -51,7 +51,7 @@ constexpr std::array<std::string_view, 8> action_names = {
 }  // namespace
 
 std::span<const ShotTransition> shot_transitions() { return table; }
-std::span<const Ignored<ShotState, ShotEvent>> shot_ignored() { return ignored; }
+std::span<const hal::Ignored<ShotState, ShotEvent>> shot_ignored() { return ignored; }
 
 std::string_view to_string(ShotState s) { return state_names[static_cast<std::size_t>(s)]; }
 std::string_view to_string(ShotEvent e) { return event_names[static_cast<std::size_t>(e)]; }

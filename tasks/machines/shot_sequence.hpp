@@ -6,7 +6,7 @@
 #pragma once
 
 #include "hal/base/realtime.hpp"
-#include "tasks/machines/transition.hpp"
+#include "hal/base/transition.hpp"
 
 #include <cstdint>
 #include <span>
@@ -47,9 +47,9 @@ enum class ShotAction : std::uint8_t {
 };
 
 struct ShotContext {};
-using ShotTransition = Transition<ShotState, ShotEvent, ShotAction, ShotContext>;
+using ShotTransition = hal::Transition<ShotState, ShotEvent, ShotAction, ShotContext>;
 std::span<const ShotTransition> shot_transitions() MOLDLOFT_NONBLOCKING;
-std::span<const Ignored<ShotState, ShotEvent>> shot_ignored();
+std::span<const hal::Ignored<ShotState, ShotEvent>> shot_ignored();
 
 std::string_view to_string(ShotState) MOLDLOFT_NONBLOCKING;
 std::string_view to_string(ShotEvent) MOLDLOFT_NONBLOCKING;

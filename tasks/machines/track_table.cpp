@@ -8,12 +8,13 @@ namespace {
 using S = TrackState;
 using E = TrackEvent;
 using A = TrackAction;
-constexpr auto any = always<TrackContext>;
-constexpr bool may_seek(const TrackContext& c) MOLDLOFT_NONBLOCKING {
-  return c.seek_steps < c.max_seek_steps;
-}
-constexpr bool may_turn(const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.turns < c.max_turns; }
-constexpr bool may_back(const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.backs < c.max_backs; }
+constexpr auto any = hal::always<TrackContext>;
+constexpr hal::Guard<TrackContext> may_seek{
+    "steps left", [](const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.seek_steps < c.max_seek_steps; }};
+constexpr hal::Guard<TrackContext> may_turn{
+    "turns left", [](const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.turns < c.max_turns; }};
+constexpr hal::Guard<TrackContext> may_back{
+    "steps back left", [](const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.backs < c.max_backs; }};
 
 // clang-format off
 constexpr TrackTransition table[] = {
@@ -66,7 +67,7 @@ constexpr TrackTransition table[] = {
     {S::step_back,    E::beyond_plan,        any,      A::report_too_large,  S::failed},
 };
 
-constexpr Ignored<S, E> ignored[] = {
+constexpr hal::Ignored<S, E> ignored[] = {
     {S::seek_edge, E::loop_closed}, {S::first_side, E::loop_closed}, {S::seek_edge, E::beyond_plan},  // the outline has not begun
     {S::closed, E::no_plate}, {S::closed, E::plate_fills_field}, {S::closed, E::side}, {S::closed, E::corner}, {S::closed, E::hidden}, {S::closed, E::loop_closed}, {S::closed, E::beyond_plan},
     {S::failed, E::no_plate}, {S::failed, E::plate_fills_field}, {S::failed, E::side}, {S::failed, E::corner}, {S::failed, E::hidden}, {S::failed, E::loop_closed}, {S::failed, E::beyond_plan},
@@ -84,7 +85,7 @@ constexpr std::array<std::string_view, 13> action_names = {
 }  // namespace
 
 std::span<const TrackTransition> track_transitions() { return table; }
-std::span<const Ignored<TrackState, TrackEvent>> track_ignored() { return ignored; }
+std::span<const hal::Ignored<TrackState, TrackEvent>> track_ignored() { return ignored; }
 
 std::string_view to_string(TrackState s) { return state_names[static_cast<std::size_t>(s)]; }
 std::string_view to_string(TrackEvent e) { return event_names[static_cast<std::size_t>(e)]; }

@@ -1,6 +1,8 @@
 // The diagrams against the tables, read row by row, and the page that shows them against the program.
 #include "firmware_like/commands/machines.hpp"
 
+#include "hal/robot/line_table.hpp"
+#include "hal/scanner/psc_table.hpp"
 #include "tasks/machines/boundary_tracker.hpp"
 #include "tasks/machines/cell_state.hpp"
 #include "tasks/machines/shot_sequence.hpp"
@@ -11,6 +13,7 @@
 #include <iterator>
 #include <string>
 #include <string_view>
+#include <vector>
 
 using namespace moldloft;
 
@@ -57,13 +60,26 @@ void check_every_row_has_its_arrow(const std::string& diagram, Table table) {
 }  // namespace
 
 TEST_CASE("every row of the tracker and of the shot sequence is an arrow with its event and action") {
-  const std::string text = firmware_like::machine_diagrams();
+  const std::string text = firmware_like::cell_diagrams();
   check_every_row_has_its_arrow(section(text, "track_table.cpp"), tasks::track_transitions());
   check_every_row_has_its_arrow(section(text, "shot_sequence.cpp"), tasks::shot_transitions());
 }
 
+TEST_CASE("every row of the drivers' tables is an arrow with its cue and action, or in the note of its cue") {
+  const std::string text = firmware_like::driver_diagrams();
+  check_every_row_has_its_arrow(section(text, "psc_table.cpp"), hal::psc_transitions());
+  const std::string robot = section(text, "line_table.cpp");
+  std::vector<hal::LineTransition> arrows;
+  for (const auto& row : hal::line_transitions()) {
+    if (row.on != hal::LineCue::link_lost) arrows.push_back(row);
+  }
+  check_every_row_has_its_arrow(robot, arrows);
+  CHECK(robot.find("note right of offline\n    link lost / report loss\n    from every state\n") !=
+        robot.npos);
+}
+
 TEST_CASE("the supervisor's stop and abort are notes, all its other rows arrows") {
-  const std::string diagram = section(firmware_like::machine_diagrams(), "cell_state.cpp");
+  const std::string diagram = section(firmware_like::cell_diagrams(), "cell_state.cpp");
   for (const auto& row : tasks::cell_transitions()) {
     const bool folded = row.on == tasks::CellEvent::stop || row.on == tasks::CellEvent::abort;
     const std::string label = arrow(diagram, to_string(row.from), to_string(row.to));
@@ -78,9 +94,12 @@ TEST_CASE("the supervisor's stop and abort are notes, all its other rows arrows"
 }
 
 TEST_CASE("guards stand on the arrows as what they ask for, their complement as else") {
-  const std::string diagram = section(firmware_like::machine_diagrams(), "track_table.cpp");
+  const std::string diagram = section(firmware_like::cell_diagrams(), "track_table.cpp");
   CHECK(arrow(diagram, "seek edge", "seek edge") ==
         "plate fills field [steps left] / step along x<br/>hidden [turns left] / turn");
+  CHECK(arrow(section(firmware_like::driver_diagrams(), "line_table.cpp"), "commanded", "syncing") ==
+        "stands still [stop answered] / report stopped and sync"
+        "<br/>reset / start sync<br/>silent / report silence");
   CHECK(arrow(diagram, "seek edge", "failed") ==
         "no plate / report off plate<br/>plate fills field [else] / report no edge"
         "<br/>hidden [else] / report hidden");
@@ -88,6 +107,12 @@ TEST_CASE("guards stand on the arrows as what they ask for, their complement as 
 
 TEST_CASE("tasks/README.md holds exactly what the program prints") {
   const std::string page = file_text(MOLDLOFT_SOURCE_DIR "/tasks/README.md");
-  CHECK_MESSAGE(page.find(firmware_like::machine_diagrams()) != page.npos,
+  CHECK_MESSAGE(page.find(firmware_like::cell_diagrams()) != page.npos,
                 "paste the output of `moldloft machines` into tasks/README.md");
+}
+
+TEST_CASE("hal/README.md holds exactly what the program prints of the drivers") {
+  const std::string page = file_text(MOLDLOFT_SOURCE_DIR "/hal/README.md");
+  CHECK_MESSAGE(page.find(firmware_like::driver_diagrams()) != page.npos,
+                "paste the drivers' part of the output of `moldloft machines` into hal/README.md");
 }

@@ -1,5 +1,6 @@
 // The tables are complete: every pair of state and event is listed or explicitly ignored, never both, and
 // every state can be reached.
+#include "hal/complete_table.hpp"
 #include "tasks/machines/boundary_tracker.hpp"
 #include "tasks/machines/cell_state.hpp"
 #include "tasks/machines/shot_sequence.hpp"
@@ -7,52 +8,9 @@
 #include <doctest/doctest.h>
 
 #include <set>
-#include <utility>
 
 using namespace moldloft::tasks;
-
-namespace {
-
-template <typename Table, typename Ignored>
-void check_complete(Table table, Ignored ignored, int states, int events) {
-  std::set<std::pair<int, int>> listed, left_out;
-  for (const auto& row : table) listed.emplace(static_cast<int>(row.from), static_cast<int>(row.on));
-  for (const auto& pair : ignored) {
-    const bool is_new = left_out.emplace(static_cast<int>(pair.in), static_cast<int>(pair.event)).second;
-    CHECK_MESSAGE(is_new, "ignored twice: ", to_string(pair.in), " / ", to_string(pair.event));
-  }
-  for (int s = 0; s < states; ++s) {
-    for (int e = 0; e < events; ++e) {
-      const bool in_table = listed.contains({s, e}), in_ignored = left_out.contains({s, e});
-      CHECK_MESSAGE(in_table != in_ignored, "state ", s, " event ", e, in_table ? " is both" : " is neither");
-    }
-  }
-}
-
-template <typename Table>
-void check_reachable(Table table, int states) {
-  std::set<int> reached{0};
-  for (std::size_t before = 0; before != reached.size();) {
-    before = reached.size();
-    for (const auto& row : table) {
-      if (reached.contains(static_cast<int>(row.from))) reached.insert(static_cast<int>(row.to));
-    }
-  }
-  CHECK(reached.size() == static_cast<std::size_t>(states));
-}
-
-// The last row of each (state, event) must have a guard that always agrees, or an event could fall through unseen.
-template <typename Table, typename Context>
-void check_no_fall_through(Table table, const Context& exhausted) {
-  std::set<std::pair<int, int>> pairs, covered;
-  for (const auto& row : table) {
-    pairs.emplace(static_cast<int>(row.from), static_cast<int>(row.on));
-    if (row.guard(exhausted)) covered.emplace(static_cast<int>(row.from), static_cast<int>(row.on));
-  }
-  CHECK(pairs == covered);
-}
-
-}  // namespace
+using namespace moldloft::hal;
 
 TEST_CASE("the supervisor's table answers every event in every state") {
   check_complete(cell_transitions(), cell_ignored(), cell_state_count, cell_event_count);
