@@ -1,5 +1,7 @@
 #include "firmware_like/config/cell_settings.hpp"
 
+#include "firmware_like/config/device_makes.hpp"
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -10,6 +12,9 @@ namespace {
 // Turned heads, retakes and corners cost shots beyond what the perimeter asks for.
 constexpr double spare_boundary_shots = 1.5;
 constexpr int few_shots = 16;
+
+// Heartbeats and answers that come between the frames.
+constexpr std::size_t spare_bytes = 4096;
 
 double smaller_field(const CellConfig& c) { return std::min(c.scanner.field_x_mm, c.scanner.field_y_mm); }
 
@@ -31,14 +36,6 @@ int surface_shots(const CellConfig& c) {
 int finest_spans(double length_mm, double span_mm) {
   const auto wanted = static_cast<unsigned>(std::max(length_mm / span_mm, 1.0));
   return static_cast<int>(std::clamp(std::bit_floor(wanted), 8u, 256u));
-}
-
-// A frame of float32 points with intensity and its tables.
-std::size_t largest_frame(const CellConfig& c) {
-  const auto points = static_cast<std::size_t>(c.scanner.max_stripes) *
-                      static_cast<std::size_t>(c.scanner.max_points_per_stripe);
-  const std::size_t bytes_a_point = c.scanner.encoding == hal::psc1::Encoding::int16 ? 7 : 13;
-  return points * bytes_a_point + static_cast<std::size_t>(c.scanner.max_stripes) * 16 + 4096;
 }
 
 }  // namespace
@@ -85,7 +82,7 @@ tasks::CellSettings cell_settings(const CellConfig& c) {
 
 hal::Recorder::Sizes recorder_sizes(const CellConfig& c) {
   hal::Recorder::Sizes sizes;
-  sizes.largest_frame_bytes = largest_frame(c);
+  sizes.largest_frame_bytes = make_of(c.scanner).largest_frame_bytes(c.scanner) + spare_bytes;
   // Four frames: a disk may stand still for three shots before the cell has to wait for it.
   sizes.bulk_bytes = 4 * (sizes.largest_frame_bytes + sizes.largest_frame_bytes / 16);
   return sizes;

@@ -1,5 +1,6 @@
 #include "firmware_like/config/config.hpp"
 
+#include "firmware_like/config/device_makes.hpp"
 #include "firmware_like/config/plate_name.hpp"
 #include "firmware_like/config/task_table.hpp"
 #include "firmware_like/config/toml_section.hpp"
@@ -33,7 +34,7 @@ geometry::RigidMotion mount_from(const std::array<double, 3>& translation_mm,
 }
 
 void read_scanner(TomlSection s, ScannerConfig& c) {
-  s.choice("driver", c.driver, {"psc1"});
+  s.choice("driver", c.driver, scanner_names());
   s.text("host", c.host);
   s.integer("port", c.port, 1, 65535);
   std::string encoding = "int16";
@@ -63,7 +64,7 @@ void read_range(TomlSection& s, std::string_view key, tasks::Range& range) {
 }
 
 void read_robot(TomlSection s, RobotConfig& c) {
-  s.choice("driver", c.driver, {"line"});
+  s.choice("driver", c.driver, robot_names());
   s.text("device", c.device);
   s.integer("baud", c.baud, 1200, 921600);
   s.integer("speed_percent", c.speed_percent, 1, 100);

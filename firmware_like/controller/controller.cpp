@@ -1,8 +1,8 @@
 #include "firmware_like/controller/controller.hpp"
 
 #include "firmware_like/config/cell_settings.hpp"
+#include "firmware_like/config/device_makes.hpp"
 #include "firmware_like/config/task_table.hpp"
-#include "firmware_like/controller/drivers.hpp"
 
 #include <array>
 #include <utility>

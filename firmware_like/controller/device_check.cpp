@@ -1,6 +1,6 @@
 #include "firmware_like/controller/device_check.hpp"
 
-#include "firmware_like/controller/drivers.hpp"
+#include "firmware_like/config/device_makes.hpp"
 #include "hal/robot/robot_line.hpp"
 #include "tasks/cell/motion_guard.hpp"
 

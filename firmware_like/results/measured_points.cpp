@@ -1,5 +1,6 @@
 #include "firmware_like/results/measured_points.hpp"
 
+#include "firmware_like/config/device_makes.hpp"
 #include "tasks/cell/shot_archive.hpp"
 #include "tasks/planning/tool_pose.hpp"
 
@@ -12,6 +13,8 @@ std::expected<std::vector<MeasuredPoint>, hal::StoreError> measured_points(const
                                                                            const hal::RunStore& store,
                                                                            std::size_t wanted,
                                                                            double gate_mm) {
+  const auto codec = frame_codec_of(store);
+  if (!codec) return std::unexpected{hal::StoreError{codec.error().what}};
   const auto shots = store.shots();
   if (!shots) return std::unexpected{shots.error()};
   const auto& surface = result.measured->surface;
@@ -25,7 +28,7 @@ std::expected<std::vector<MeasuredPoint>, hal::StoreError> measured_points(const
   Eigen::Vector2d guess{0.5, 0.5};
   for (const auto& shot : *shots) {
     if (shot.purpose != hal::ShotPurpose::surface) continue;
-    const auto frame = store.frame(shot);
+    const auto frame = store.frame(shot, **codec);
     if (!frame) return std::unexpected{frame.error()};
     const auto world_from_scanner = tasks::motion_of(shot.reported) * result.tip_from_scanner;
     for (const auto& line : frame->lines()) {

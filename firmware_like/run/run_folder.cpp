@@ -1,6 +1,7 @@
 #include "firmware_like/run/run_folder.hpp"
 
 #include "firmware_like/config/config.hpp"
+#include "firmware_like/config/device_makes.hpp"
 #include "firmware_like/config/plate_name.hpp"
 #include "firmware_like/process/build_info.hpp"
 #include "firmware_like/process/json_file.hpp"
@@ -139,6 +140,9 @@ std::expected<RunFolder, Failure> create_run(const fs::path& asked, const std::s
   const RunNames kept{names.plate.empty() ? name_of_folder(path) : names.plate, names.remark};
   about.emplace_back("plate", kept.plate);
   if (!kept.remark.empty()) about.emplace_back("remark", kept.remark);
+  const auto config = parse_config(config_text, "the run's configuration");
+  const ScannerConfig scanner = config ? config->scanner : ScannerConfig{};
+  about.emplace_back(frame_codec_key, make_of(scanner).codec->name);
   // A simulated run happens at no time: its seed brings it back, byte for byte.
   if (kind == RunKind::measured) about.emplace_back("begun", now_utc());
   for (const auto& [key, value] : about) {
@@ -220,7 +224,9 @@ std::expected<RunFolder, Failure> open_run(const fs::path& path) {
   }
   auto store = hal::RunStore::open(store_path(path), hal::RunStore::Mode::read);
   if (!store) return error(store.error().what);
-  auto shots = StoredShots::load(*store);
+  const auto codec = frame_codec_of(*store);
+  if (!codec) return std::unexpected{codec.error()};
+  auto shots = StoredShots::load(*store, **codec);
   if (!shots) return error(shots.error().what);
   RunNames names{store->meta("plate").value_or(name_of_folder(path)), store->meta("remark").value_or("")};
   return RunFolder{path,

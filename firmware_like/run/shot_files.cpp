@@ -4,12 +4,13 @@
 
 namespace moldloft::firmware_like {
 
-std::expected<StoredShots, hal::StoreError> StoredShots::load(const hal::RunStore& store) {
+std::expected<StoredShots, hal::StoreError> StoredShots::load(const hal::RunStore& store,
+                                                              const hal::FrameCodec& codec) {
   const auto records = store.shots();
   if (!records) return std::unexpected{records.error()};
   StoredShots loaded;
   for (const auto& record : *records) {
-    auto frame = store.frame(record);
+    auto frame = store.frame(record, codec);
     if (!frame) return std::unexpected{frame.error()};
     loaded.frames_.push_back(std::make_unique<hal::Frame>(std::move(*frame)));
     loaded.last_epoch_ = std::max(loaded.last_epoch_, record.shot_id >> tasks::shot_number_bits);

@@ -11,7 +11,7 @@ namespace moldloft::firmware_like {
 
 class StoredShots final : public tasks::ShotArchive {
  public:
-  static std::expected<StoredShots, hal::StoreError> load(const hal::RunStore&);
+  static std::expected<StoredShots, hal::StoreError> load(const hal::RunStore&, const hal::FrameCodec&);
   const tasks::ArchivedShot* find(std::uint32_t number) const override;
   std::uint32_t last() const override { return last_; }
   std::uint32_t last_epoch() const { return last_epoch_; }  // 0 for none

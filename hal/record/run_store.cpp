@@ -2,7 +2,6 @@
 
 #include "hal/base/printable_text.hpp"
 #include "hal/record/statement.hpp"
-#include "hal/scanner/psc1.hpp"
 
 #include <algorithm>
 #include <array>
@@ -400,27 +399,20 @@ std::expected<std::vector<std::byte>, StoreError> RunStore::bytes(LinkId link, D
   return bytes;
 }
 
-std::expected<Frame, StoreError> RunStore::frame(const ShotRecord& shot) const {
-  const auto flawed = [&](psc1::Flaw flaw) {
-    return std::unexpected{
-        StoreError{fmt::format("{}: shot {}: {}", database_->path, shot.shot_id, to_string(flaw))}};
+std::expected<Frame, StoreError> RunStore::frame(const ShotRecord& shot, const FrameCodec& codec) const {
+  const auto flawed = [&](std::string_view what) {
+    return std::unexpected{StoreError{fmt::format("{}: shot {}: {}", database_->path, shot.shot_id, what)}};
   };
-  if (shot.payload_offset < psc1::header_size) return flawed(psc1::Flaw::too_short);
-  const auto message = bytes(LinkId::scanner, Direction::received, shot.payload_offset - psc1::header_size,
-                             psc1::header_size + shot.payload_bytes);
+  if (shot.payload_offset < codec.head_bytes) return flawed("its frame begins before the link's first byte");
+  const auto message = bytes(LinkId::scanner, Direction::received, shot.payload_offset - codec.head_bytes,
+                             codec.head_bytes + shot.payload_bytes);
   if (!message) return std::unexpected{message.error()};
-  const auto header = psc1::decode_header(std::span{*message}.first<psc1::header_size>());
-  if (!header) return flawed(header.error());
-  const auto payload = std::span{*message}.subspan(psc1::header_size);
-  const auto head = psc1::decode_frame_head(payload);
-  if (!head) return flawed(head.error());
-  if (head->point_count > payload.size() || head->stripe_count > payload.size())
-    return flawed(psc1::Flaw::payload_size);
-  Frame frame{head->stripe_count, head->point_count};
-  if (const auto decoded = psc1::decode_frame(payload, frame); !decoded) return flawed(decoded.error());
-  frame.exposed_sensor_ns = header->acquired_ns;
-  frame.arrived = shot.at;
-  return frame;
+  auto frame = codec.decode(*message);
+  if (!frame) return flawed(frame.error());
+  frame->arrived = shot.at;
+  return std::move(*frame);
 }
+
+const std::string& RunStore::path() const { return database_->path; }
 
 }  // namespace moldloft::hal

@@ -12,7 +12,7 @@
 #pragma once
 
 #include "hal/record/run_record.hpp"
-#include "hal/scanner/frame.hpp"
+#include "hal/scanner/frame_codec.hpp"
 
 #include <cstdint>
 #include <expected>
@@ -53,7 +53,9 @@ class RunStore {
   std::expected<std::vector<EventRecord>, StoreError> events() const;
   std::expected<std::vector<std::byte>, StoreError> bytes(LinkId, Direction, std::uint64_t offset,
                                                           std::uint64_t size) const;
-  std::expected<Frame, StoreError> frame(const ShotRecord&) const;  // decoded from the bytes as they came
+  // Decoded from the bytes as they came, by the codec of the scanner that sent them.
+  std::expected<Frame, StoreError> frame(const ShotRecord&, const FrameCodec&) const;
+  const std::string& path() const;
 
  private:
   struct Database;

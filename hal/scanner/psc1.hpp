@@ -10,7 +10,7 @@
 
 #include "hal/base/fixed_text.hpp"
 #include "hal/base/realtime.hpp"
-#include "hal/scanner/frame.hpp"
+#include "hal/scanner/frame_codec.hpp"
 
 #include <array>
 #include <cstdint>
@@ -157,6 +157,12 @@ std::expected<StatusReply, Flaw> decode_status(std::span<const std::byte> payloa
     MOLDLOFT_NONBLOCKING;
 std::expected<ErrorReply, Flaw> decode_error(std::span<const std::byte> payload) noexcept
     MOLDLOFT_NONBLOCKING;
+// A FRAME of this many stripes and points takes at most so many bytes, header and CRC and all, intensity included.
+std::size_t largest_message(std::size_t stripes, std::size_t points, Encoding) noexcept;
+
+// FRAME messages as a run's store keeps them.
+extern const FrameCodec frame_codec;
+
 std::expected<FrameHead, Flaw> decode_frame_head(std::span<const std::byte> payload) noexcept
     MOLDLOFT_NONBLOCKING;
 

@@ -306,4 +306,30 @@ std::expected<void, Flaw> decode_frame(std::span<const std::byte> payload, Frame
   return {};
 }
 
+std::size_t largest_message(std::size_t stripes, std::size_t points, Encoding encoding) noexcept {
+  return header_size + payload_size(stripes, points, encoding, true) + payload_crc_size;
+}
+
+namespace {
+
+std::expected<Frame, std::string_view> decode_message(std::span<const std::byte> message) {
+  const auto flawed = [](Flaw flaw) { return std::unexpected{to_string(flaw)}; };
+  if (message.size() < header_size) return flawed(Flaw::too_short);
+  const auto header = decode_header(message.first<header_size>());
+  if (!header) return flawed(header.error());
+  const auto payload = message.subspan(header_size);
+  const auto head = decode_frame_head(payload);
+  if (!head) return flawed(head.error());
+  if (head->point_count > payload.size() || head->stripe_count > payload.size())
+    return flawed(Flaw::payload_size);
+  Frame frame{head->stripe_count, head->point_count};
+  if (const auto decoded = decode_frame(payload, frame); !decoded) return flawed(decoded.error());
+  frame.exposed_sensor_ns = header->acquired_ns;
+  return frame;
+}
+
+}  // namespace
+
+const FrameCodec frame_codec{.name = "psc1", .head_bytes = header_size, .decode = decode_message};
+
 }  // namespace moldloft::hal::psc1

@@ -64,6 +64,7 @@ std::string cell_toml(const CellDescription& d, const PlateInstance& plate, cons
       "= [{}, {}]\nnoise_mm = {}\ndepth_mm = {}\n",
       addresses.scanner_port, d.optics.stripes, d.optics.points_per_stripe, d.optics.field_x_mm,
       d.optics.field_y_mm, d.optics.noise_mm, d.optics.depth_mm);
+  if (d.scanner_driver != "psc1") t += fmt::format("driver = \"{}\"\n", d.scanner_driver);
   t += "\n[scanner.mount]\ntranslation_mm = [0, 140, 300]\nzyz_deg = [0, 180, 180]\n";
   t += fmt::format("\n[robot]\ndevice = {}\nrepeatability_z_mm = {}\n\n[robot.workspace]\n{}",
                    toml_string(addresses.robot_device), d.drive.errors.z_mm, workspace(d));

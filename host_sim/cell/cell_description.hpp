@@ -48,6 +48,8 @@ struct CellDescription {
   GantrySettings gantry;
   ArmDrive::Settings drive;
   OpticsSettings optics;
+  std::string scanner_driver = "psc1";  // as the cell's configuration names the make
+  MakeScannerDevice make_scanner = make_scanner_server;
   ScannerTimes scanner_times;
   RobotTimes robot_times;
   geometry::RigidMotion tip_from_scanner = nominal_mount();  // as it truly is

@@ -19,15 +19,17 @@ SimulatedWorld::SimulatedWorld(const CellDescription& cell, PlateInstance plate,
     : plate_(std::move(plate)),
       tip_from_scanner_(cell.tip_from_scanner),
       robot_(robot_device, ArmDrive(make_arm(cell), cell.drive, cell.seed), cell.robot_times),
-      scanner_(scanner_device, Optics(cell.optics), *this, cell.scanner_times, cell.seed) {}
+      exposure_(cell.scanner_times.exposure),
+      scanner_(cell.make_scanner(scanner_device, Optics(cell.optics), *this, cell.scanner_times, cell.seed)) {
+}
 
 void SimulatedWorld::step(hal::Instant now) {
   account(now);
   robot_.step(now);
-  scanner_.step(now);
+  scanner_->step(now);
   const auto& robot = robot_.counters();
-  began_ |= robot.motions + robot.calibrations + scanner_.counters().exposures > 0;
-  const std::uint64_t done = robot_.commands_done() + scanner_.counters().frames_sent;
+  began_ |= robot.motions + robot.calibrations + scanner_->counters().exposures > 0;
+  const std::uint64_t done = robot_.commands_done() + scanner_->counters().frames_sent;
   if (done != done_) at_last_done_ = so_far_;
   done_ = done;
 }
@@ -41,15 +43,15 @@ void SimulatedWorld::account(hal::Instant now) {
   const Span step{accounted_, now};
   accounted_ = now;
   if (!began_) return;
-  const auto exposed = scanner_.busy_from() + scanner_.times().exposure;
+  const auto exposed = scanner_->busy_from() + exposure_;
   const Span arm = Span{robot_.busy_from(), robot_.busy_until()}.within(step);
-  const Span eye = Span{scanner_.busy_from(), scanner_.busy_until()}.within(step);
+  const Span eye = Span{scanner_->busy_from(), scanner_->busy_until()}.within(step);
   so_far_.total += step.length();
   so_far_.moving += Span{robot_.busy_from(), robot_.stands_at()}.within(step).length();
   so_far_.settling += Span{robot_.stands_at(), robot_.busy_until()}.within(step).length();
   so_far_.exposing +=
-      Span{scanner_.busy_from(), std::min(exposed, scanner_.busy_until())}.within(step).length();
-  so_far_.computing += Span{exposed, scanner_.busy_until()}.within(step).length();
+      Span{scanner_->busy_from(), std::min(exposed, scanner_->busy_until())}.within(step).length();
+  so_far_.computing += Span{exposed, scanner_->busy_until()}.within(step).length();
   so_far_.idle += step.length() - arm.length() - eye.length() + arm.within(eye).length();
 }
 

@@ -48,7 +48,7 @@ class SimulatedWorld final : public Scene {
   }
 
   CellTimes times() const noexcept { return at_last_done_; }
-  ScannerServer& scanner() noexcept { return scanner_; }
+  ScannerDevice& scanner() noexcept { return *scanner_; }
   RobotServer& robot() noexcept { return robot_; }
 
  private:
@@ -57,7 +57,8 @@ class SimulatedWorld final : public Scene {
   PlateInstance plate_;
   geometry::RigidMotion tip_from_scanner_;
   RobotServer robot_;
-  ScannerServer scanner_;
+  hal::Duration exposure_;  // of a shot
+  std::unique_ptr<ScannerDevice> scanner_;
 
   bool began_ = false;
   hal::Instant accounted_{0};

@@ -291,4 +291,9 @@ void ScannerServer::drop() {
   forget_connection();
 }
 
+std::unique_ptr<ScannerDevice> make_scanner_server(hal::ByteLink& link, Optics optics, const Scene& scene,
+                                                   const ScannerTimes& times, std::uint64_t seed) {
+  return std::make_unique<ScannerServer>(link, std::move(optics), scene, times, seed);
+}
+
 }  // namespace moldloft::host_sim

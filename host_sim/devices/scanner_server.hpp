@@ -13,42 +13,23 @@
 #include "hal/base/clock.hpp"
 #include "hal/links/byte_link.hpp"
 #include "hal/scanner/psc1.hpp"
-#include "host_sim/optics/optics.hpp"
+#include "host_sim/devices/scanner_device.hpp"
 
 #include <cstdint>
 #include <vector>
 
 namespace moldloft::host_sim {
 
-// What the scanner looks at. True positions, not reported ones.
-class Scene {
- public:
-  virtual ~Scene() = default;
-  virtual const PlateInstance& plate() const = 0;
-  virtual geometry::RigidMotion world_from_scanner(hal::Instant at) const = 0;
-};
-
-struct ScannerTimes {
-  hal::Duration exposure = std::chrono::microseconds{100};
-  hal::Duration processing = std::chrono::milliseconds{100};
-};
-
-struct ScannerCounters {
-  std::uint64_t exposures = 0, frames_sent = 0, repeats = 0, errors_sent = 0, connections = 0, dropped = 0;
-};
-
-class ScannerServer {
+class ScannerServer final : public ScannerDevice {
  public:
   ScannerServer(hal::ByteLink&, Optics, const Scene&, const ScannerTimes&, std::uint64_t seed);
 
-  void step(hal::Instant now);
-  void power_cycle();  // everything is forgotten, the session is a new one
+  void step(hal::Instant now) override;
+  void power_cycle() override;  // the session is a new one
 
-  // The last shot's work: exposing and computing in [busy_from, busy_until).
-  hal::Instant busy_from() const noexcept { return busy_from_; }
-  hal::Instant busy_until() const noexcept { return busy_until_; }
-  const ScannerCounters& counters() const noexcept { return counters_; }
-  const ScannerTimes& times() const noexcept { return times_; }
+  hal::Instant busy_from() const noexcept override { return busy_from_; }
+  hal::Instant busy_until() const noexcept override { return busy_until_; }
+  const ScannerCounters& counters() const noexcept override { return counters_; }
   std::uint32_t session_id() const noexcept { return session_id_; }
 
  private:
@@ -95,5 +76,8 @@ class ScannerServer {
   hal::Instant busy_from_{-1}, busy_until_{-1};
   hal::Frame frame_;
 };
+
+std::unique_ptr<ScannerDevice> make_scanner_server(hal::ByteLink&, Optics, const Scene&, const ScannerTimes&,
+                                                   std::uint64_t seed);
 
 }  // namespace moldloft::host_sim

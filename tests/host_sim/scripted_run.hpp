@@ -3,6 +3,7 @@
 // shot and no record is lost.
 #pragma once
 
+#include "firmware_like/config/device_makes.hpp"
 #include "hal/record/run_store.hpp"
 #include "hal/temporary_folder.hpp"
 #include "host_sim/cell/cell_config.hpp"
@@ -115,7 +116,7 @@ class ScriptedRun {
     const auto opened = store();
     for (const auto& shot : records) {
       numbers.insert(tasks::shot_number_of(shot.shot_id));
-      CHECK(opened.frame(shot).has_value());
+      CHECK(opened.frame(shot, **firmware_like::frame_codec_of(opened)).has_value());
     }
     CHECK(numbers.size() == records.size());
     const auto counted = [&](const char* purpose) { return summary["shots"][purpose].get<std::size_t>(); };

@@ -79,7 +79,7 @@ TEST_CASE(
   const auto shots = store->shots();
   REQUIRE(shots.has_value());
   REQUIRE(shots->size() == 5);
-  const auto frame = store->frame(shots->back());
+  const auto frame = store->frame(shots->back(), hal::psc1::frame_codec);
   REQUIRE_MESSAGE(frame.has_value(), frame.error().what);
   CHECK(frame->stripe_count == 40);
   CHECK(frame->point_count == 40 * 120);

@@ -204,7 +204,7 @@ TEST_CASE(
                           .payload_bytes = driver.frame_bytes()};
     recorder.shot(shot);
     REQUIRE(recorder.drain(store));
-    const auto frame = store.frame(store.shots()->back());
+    const auto frame = store.frame(store.shots()->back(), psc1::frame_codec);
     REQUIRE(frame);
     CHECK(frame->shot_id == id);
     driver.unpack(frame->point_count);

@@ -147,7 +147,7 @@ TEST_CASE("a shot's frame is decoded from the bytes as they came") {
   ShotRecord record = shot;
   record.payload_offset = 77 + 32;
   record.payload_bytes = static_cast<std::uint32_t>(wire.size() - 36);
-  const auto back = store.frame(record);
+  const auto back = store.frame(record, psc1::frame_codec);
   REQUIRE(back);
   CHECK(back->shot_id == 42);
   CHECK(back->exposed_sensor_ns == frame.exposed_sensor_ns);
@@ -156,10 +156,11 @@ TEST_CASE("a shot's frame is decoded from the bytes as they came") {
   CHECK(back->z == frame.z);
   CHECK(back->intensity == frame.intensity);
   record.payload_offset += 1;
-  CHECK(store.frame(record).error().what.ends_with("run.db: bytes 78 to " +
-                                                   std::to_string(78 + wire.size() - 4) +
-                                                   " of the link are not all there") == false);
-  CHECK_FALSE(store.frame(record));
+  CHECK(store.frame(record, psc1::frame_codec)
+            .error()
+            .what.ends_with("run.db: bytes 78 to " + std::to_string(78 + wire.size() - 4) +
+                            " of the link are not all there") == false);
+  CHECK_FALSE(store.frame(record, psc1::frame_codec));
 }
 
 TEST_CASE("a resumed run appends: its bytes follow those of the run before, its shots find them") {
@@ -185,7 +186,7 @@ TEST_CASE("a resumed run appends: its bytes follow those of the run before, its 
   }
   const RunStore store = opened(path, Mode::read);
   CHECK(*store.bytes(LinkId::scanner, Direction::received, 0, 100) == counting(100));
-  const auto back = store.frame(store.shots()->front());
+  const auto back = store.frame(store.shots()->front(), psc1::frame_codec);
   REQUIRE(back);
   CHECK(back->shot_id == 43);
 }

@@ -212,7 +212,8 @@ TEST_CASE(
   }
   read_again(cell.folder());
   const auto store = *hal::RunStore::open(fs::path{cell.folder()} / "run.db", hal::RunStore::Mode::read);
-  for (const auto& e : *store.events()) CHECK(is_clean_utf8(std::string{e.text.view()}));
+  const auto events = store.events();
+  for (const auto& e : *events) CHECK(is_clean_utf8(std::string{e.text.view()}));
 }
 
 TEST_CASE("a run's folder and a plate's name may be called anything that a file system takes") {
