@@ -167,6 +167,20 @@ int run_command_line(int argc, char** argv) {
                                   "serve the robot on this serial port instead, 115200 baud")
                      ->excludes(pty);
   devices_command
+      ->add_option_function<std::string>(
+          "--robot-port",
+          [&devices](const std::string& word) {
+            std::uint16_t port = 0;
+            const moldloft::firmware_like::Limits<std::uint16_t> limits{0, 65535};
+            if (!read_number(word, limits, port))
+              throw CLI::ValidationError(out_of_limits("--robot-port", word, limits));
+            devices.robot_port = port;
+          },
+          "serve the robot's lines on this loopback TCP port instead, 0 for any")
+      ->type_name("INT in [0 - 65535]")
+      ->excludes(pty)
+      ->excludes(serial);
+  devices_command
       ->add_option("--controller-serial", devices.controller_serial,
                    "the controller's port at the other end of that cable, for --cell")
       ->needs(serial)

@@ -48,33 +48,38 @@ struct Findings {
   }
 };
 
-// What the configuration says and this machine does not have.
-void look_at_machine(const ExaminedConfig& examined, Findings& findings) {
-  const CellConfig& c = examined.config;
-  const auto is_wrong = [&](std::string_view key) {
-    return std::ranges::any_of(examined.findings, [&](const ConfigFinding& f) {
-      return f.severity == Severity::error && !f.keys.empty() && f.keys.front() == key;
-    });
-  };
-  if (!is_wrong("scanner.host") && !hal::is_known_host(c.scanner.host))
-    findings.tell(
-        Severity::error, c, "scanner.host",
-        fmt::format("[scanner] host: '{}' is neither an address nor a name in /etc/hosts; write the address "
-                    "in numbers",
-                    c.scanner.host));
-  if (is_wrong("robot.device")) return;
-  const std::string& device = c.robot.device;
-  struct stat about {};
+// What a section says of its device's place, and this machine does not have.
+void look_for(const std::string& section, const LinkConfig& place, const ExaminedConfig& examined,
+              Findings& findings) {
+  const std::string name = key_of_place(place), key = section + "." + name;
+  const bool is_wrong = std::ranges::any_of(examined.findings, [&](const ConfigFinding& f) {
+    return f.severity == Severity::error && !f.keys.empty() && f.keys.front() == key;
+  });
+  if (is_wrong) return;
   const auto wrong = [&](const std::string& why) {
-    findings.tell(Severity::error, c, "robot.device", fmt::format("[robot] device: {} {}", device, why));
+    findings.tell(Severity::error, examined.config, key, fmt::format("[{}] {}: {}", section, name, why));
   };
+  if (place.link == "tcp") {
+    if (!hal::is_known_host(place.host))
+      wrong(fmt::format("'{}' is neither an address nor a name in /etc/hosts; write the address in numbers",
+                        place.host));
+    return;
+  }
+  const std::string& device = place.device;
+  struct stat about {};
   if (::stat(device.c_str(), &about) != 0)
-    wrong(errno == ENOENT ? "does not exist; is the robot's cable plugged in, is the name right?"
-                          : fmt::format("cannot be looked at: {}", strerrordesc_np(errno)));
+    wrong(errno == ENOENT ? fmt::format("{} does not exist; is the {}'s cable plugged in, is the name right?",
+                                        device, section)
+                          : fmt::format("{} cannot be looked at: {}", device, strerrordesc_np(errno)));
   else if (!S_ISCHR(about.st_mode))
-    wrong("is no serial port");
+    wrong(device + " is no serial port");
   else if (::access(device.c_str(), R_OK | W_OK) != 0)
-    wrong("gives this user no permission; join the group that owns it (often dialout)");
+    wrong(device + " gives this user no permission; join the group that owns it (often dialout)");
+}
+
+void look_at_machine(const ExaminedConfig& examined, Findings& findings) {
+  look_for("scanner", examined.config.scanner.place, examined, findings);
+  look_for("robot", examined.config.robot.place, examined, findings);
 }
 
 double available_mib() {
@@ -148,22 +153,20 @@ void print_devices(const CellConfig& c, Findings& findings) {
   const auto claim = claim_cell(c);
   if (!claim) return findings.tell({Severity::error, 0, claim.error(), {}});
   hal::SteadyClock clock;
-  const auto scanner = hal::make_tcp_link(c.scanner.host, static_cast<std::uint16_t>(c.scanner.port));
-  const auto robot = hal::make_serial_link(c.robot.device, c.robot.baud);
+  const auto scanner = make_link(c.scanner.place), robot = make_link(c.robot.place);
   std::random_device any;
   const auto reports = try_devices(c, clock, *scanner, *robot, any() | 1u);
   show(fmt::format("devices\n"));
-  const auto show_device = [&](const char* name, const std::string& where, const DeviceReport& report,
-                               const char* key) {
+  const auto show_device = [&](const char* name, const LinkConfig& place, const DeviceReport& report) {
+    const std::string where = place_of(place), key = fmt::format("{}.{}", name, key_of_place(place));
     if (report.ok)
       show(fmt::format("  {:<22}{}\n", name, report.text));
     else
       findings.tell(Severity::error, c, key, fmt::format("{} ({}): {}", name, where, report.text));
     for (const auto& warning : report.warnings) findings.tell({Severity::warning, 0, warning, {}});
   };
-  show_device("scanner", fmt::format("{}:{}", c.scanner.host, c.scanner.port), reports.scanner,
-              "scanner.host");
-  show_device("robot", c.robot.device, reports.robot, "robot.device");
+  show_device("scanner", c.scanner.place, reports.scanner);
+  show_device("robot", c.robot.place, reports.robot);
 }
 
 std::string counted(int n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }

@@ -167,8 +167,8 @@ RunConditions run_beside_threads(Controller& controller, const CellConfig& confi
   const RecorderThread recorder{controller.recorder(), *folder.store, flight};
   std::optional<OperatorThread> operators;
   if (operator_socket != nullptr) operators.emplace(*operator_socket, controller.cell());
-  const Surroundings around{.scanner = fmt::format("{}:{}", config.scanner.host, config.scanner.port),
-                            .robot = config.robot.device,
+  const Surroundings around{.scanner = place_of(config.scanner.place),
+                            .robot = place_of(config.robot.place),
                             .has_operator = operator_socket != nullptr};
   service.emplace(controller.cell(), controller.scheduler(), folder.path, around);
   conditions.setup = process.rows();
@@ -251,9 +251,7 @@ int run_cell(const RunOptions& options) {
   if (!folder) return complain(folder.error().what);
 
   hal::SteadyClock clock;
-  const auto scanner_link =
-      hal::make_tcp_link(config->scanner.host, static_cast<std::uint16_t>(config->scanner.port));
-  const auto robot_link = hal::make_serial_link(config->robot.device, config->robot.baud);
+  const auto scanner_link = make_link(config->scanner.place), robot_link = make_link(config->robot.place);
   const auto controller =
       std::make_unique<Controller>(*config, clock, *scanner_link, *robot_link,
                                    ControllerOptions{.archive = folder->archive.get(),

@@ -33,10 +33,17 @@ geometry::RigidMotion mount_from(const std::array<double, 3>& translation_mm,
   return mount;
 }
 
-void read_scanner(TomlSection s, ScannerConfig& c) {
-  s.choice("driver", c.driver, scanner_names());
+void read_place(TomlSection& s, LinkConfig& c) {
+  s.choice("link", c.link, link_names());
   s.text("host", c.host);
   s.integer("port", c.port, 1, 65535);
+  s.text("device", c.device);
+  s.integer("baud", c.baud, 1200, 921600);
+}
+
+void read_scanner(TomlSection s, ScannerConfig& c) {
+  s.choice("driver", c.driver, scanner_names());
+  read_place(s, c.place);
   std::string encoding = "int16";
   s.choice("encoding", encoding, {"int16", "float32"});
   c.encoding = encoding == "int16" ? hal::psc1::Encoding::int16 : hal::psc1::Encoding::float32;
@@ -65,8 +72,7 @@ void read_range(TomlSection& s, std::string_view key, tasks::Range& range) {
 
 void read_robot(TomlSection s, RobotConfig& c) {
   s.choice("driver", c.driver, robot_names());
-  s.text("device", c.device);
-  s.integer("baud", c.baud, 1200, 921600);
+  read_place(s, c.place);
   s.integer("speed_percent", c.speed_percent, 1, 100);
   s.number("repeatability_z_mm", c.repeatability_z_mm, 0, 10);
   s.number("arrival_mm", c.arrival.distance_mm, 0.01, 1000);
@@ -274,10 +280,12 @@ std::string first_difference(const std::string& text, const std::string& other) 
   flatten(toml::parse(other), "", b);
   for (auto* keys : {&a, &b}) {
     for (const char* no_matter : {"cell.name", "cell.device_timeout_s", "cell.scanner_wait_s",
-                                  "robot.arrival_mm", "robot.arrival_deg", "scanner.host", "scanner.port",
-                                  "robot.device", "robot.baud", "plate.largest_mm"}) {
+                                  "robot.arrival_mm", "robot.arrival_deg", "plate.largest_mm"}) {
       keys->erase(no_matter);
     }
+    for (const char* section : {"scanner", "robot"})
+      for (const char* where : {"link", "host", "port", "device", "baud"})
+        keys->erase(fmt::format("{}.{}", section, where));
     std::erase_if(*keys, [](const auto& key) { return key.first.starts_with("realtime."); });
   }
   for (const auto& [key, value] : a) {

@@ -5,7 +5,9 @@
 #pragma once
 
 #include "firmware_like/config/config_rules.hpp"
+#include "firmware_like/config/device_links.hpp"
 #include "firmware_like/config/realtime_config.hpp"
+#include "hal/robot/robot_line.hpp"
 #include "hal/scanner/psc1.hpp"
 #include "tasks/cell/cell.hpp"
 
@@ -22,8 +24,7 @@ struct ConfigError {
 
 struct ScannerConfig {
   std::string driver = "psc1";
-  std::string host = "127.0.0.1";
-  int port = hal::psc1::default_port;
+  LinkConfig place{.link = "tcp", .port = hal::psc1::default_port};
   hal::psc1::Encoding encoding = hal::psc1::Encoding::int16;
   int max_stripes = 100;
   int max_points_per_stripe = 500;
@@ -35,8 +36,7 @@ struct ScannerConfig {
 
 struct RobotConfig {
   std::string driver = "line";
-  std::string device = "/dev/ttyS0";
-  int baud = 115200;
+  LinkConfig place{.link = "serial", .port = hal::robot_line::default_port};
   int speed_percent = 100;
   double repeatability_z_mm = 0.013;
   tasks::Workspace workspace;

@@ -32,10 +32,23 @@ double smaller_field(const CellConfig& c) { return std::min(c.scanner.field_x_mm
 // No table at all is written as a table far below.
 bool has_table(const CellConfig& c) { return c.plate.table_z_mm > -500; }
 
-MaybeFinding host(const CellConfig& c) {
-  const std::string& h = c.scanner.host;
-  const auto no = [](const std::string& why) { return error({"scanner.host"}, "[scanner] host: " + why); };
-  if (h.empty()) return no("is empty; write the scanner's address");
+// "[scanner] host: ...", of the section's own place.
+struct Placed {
+  const char* section;
+  const LinkConfig& place;
+
+  MaybeFinding wrong(const char* key, const std::string& why) const {
+    return error({fmt::format("{}.{}", section, key)}, fmt::format("[{}] {}: {}", section, key, why));
+  }
+  MaybeFinding doubtful(const char* key, const std::string& why) const {
+    return warning({fmt::format("{}.{}", section, key)}, fmt::format("[{}] {}: {}", section, key, why));
+  }
+};
+
+MaybeFinding host(const Placed& of) {
+  const std::string& h = of.place.host;
+  const auto no = [&](const std::string& why) { return of.wrong("host", why); };
+  if (h.empty()) return no(fmt::format("is empty; write the {}'s address", of.section));
   if (h.find("//") != h.npos) return no("is a URL; write the address alone, and the port into port");
   if (h.find_first_of(" \t/") != h.npos) return no("has a blank or a slash in it; write the address alone");
   const auto colon = h.find(':');
@@ -46,19 +59,39 @@ MaybeFinding host(const CellConfig& c) {
   return {};
 }
 
-MaybeFinding device(const CellConfig& c) {
-  if (!c.robot.device.empty()) return {};
-  return error({"robot.device"},
-               "[robot] device: is empty; write the serial port's path, such as /dev/ttyS0");
+MaybeFinding device(const Placed& of) {
+  if (!of.place.device.empty()) return {};
+  return of.wrong("device", "is empty; write the serial port's path, such as /dev/ttyS0");
 }
 
-MaybeFinding baud(const CellConfig& c) {
+MaybeFinding baud(const Placed& of) {
   constexpr std::array usual = {1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600};
-  if (std::ranges::find(usual, c.robot.baud) != usual.end()) return {};
-  return warning({"robot.baud"},
-                 fmt::format("[robot] baud: {} is no usual rate; many ports refuse it or run at "
-                             "another (usual: 9600, 19200, 38400, 57600, 115200)",
-                             c.robot.baud));
+  if (std::ranges::find(usual, of.place.baud) != usual.end()) return {};
+  return of.doubtful("baud", fmt::format("{} is no usual rate; many ports refuse it or run at "
+                                         "another (usual: 9600, 19200, 38400, 57600, 115200)",
+                                         of.place.baud));
+}
+
+template <MaybeFinding (*rule)(const Placed&)>
+MaybeFinding of_scanner(const CellConfig& c) {
+  const bool counts = (c.scanner.place.link == "tcp") == (rule == host);
+  return counts ? rule({"scanner", c.scanner.place}) : MaybeFinding{};
+}
+
+template <MaybeFinding (*rule)(const Placed&)>
+MaybeFinding of_robot(const CellConfig& c) {
+  const bool counts = (c.robot.place.link == "tcp") == (rule == host);
+  return counts ? rule({"robot", c.robot.place}) : MaybeFinding{};
+}
+
+// Scanner and robot cannot be at one and the same place.
+MaybeFinding same_place(const CellConfig& c) {
+  const std::string place = place_of(c.scanner.place);
+  if (c.scanner.place.link != c.robot.place.link || place != place_of(c.robot.place)) return {};
+  const std::string key = key_of_place(c.robot.place);
+  return error(
+      {"robot." + key, "robot.port", "robot.link", "scanner." + key, "scanner.link"},
+      fmt::format("[robot] {}: {} is the scanner's too; each device has a place of its own", key, place));
 }
 
 MaybeFinding speed(const CellConfig& c) {
@@ -279,12 +312,31 @@ MaybeFinding noise(const CellConfig& c) {
 
 std::vector<ConfigFinding> contradictions(const CellConfig& c) {
   std::vector<ConfigFinding> found;
-  for (const auto rule :
-       {host,         device,           baud,         speed,           seek_over_step_limit,
-        reach,        start_place,      start_height, mount_in_metres, mount_in_radians,
-        scan_overlap, tracking_overlap, shots,        largest_plate,   step_across_the_plate,
-        seek_step,    seek_limit,       scan_margin,  tolerance,       finest_span,
-        noise}) {
+  for (const auto rule : {of_scanner<host>,
+                          of_scanner<device>,
+                          of_scanner<baud>,
+                          of_robot<host>,
+                          of_robot<device>,
+                          of_robot<baud>,
+                          same_place,
+                          speed,
+                          seek_over_step_limit,
+                          reach,
+                          start_place,
+                          start_height,
+                          mount_in_metres,
+                          mount_in_radians,
+                          scan_overlap,
+                          tracking_overlap,
+                          shots,
+                          largest_plate,
+                          step_across_the_plate,
+                          seek_step,
+                          seek_limit,
+                          scan_margin,
+                          tolerance,
+                          finest_span,
+                          noise}) {
     MaybeFinding finding = rule(c);
     if (!finding) continue;
     for (const auto& key : finding->keys) {

@@ -27,7 +27,7 @@ std::size_t largest_psc_frame(const ScannerConfig& config) {
 
 std::unique_ptr<hal::Robot> line_robot(const RobotConfig& config, hal::ByteLink& link, std::uint32_t nonce) {
   return std::make_unique<hal::LineRobot>(
-      link, hal::LineRobot::Settings{.baud = config.baud, .first_nonce = nonce});
+      link, hal::LineRobot::Settings{.baud = config.place.baud, .first_nonce = nonce});
 }
 
 std::vector<ScannerMake>& scanners() {

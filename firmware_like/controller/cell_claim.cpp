@@ -5,9 +5,9 @@
 namespace moldloft::firmware_like {
 
 std::expected<CellClaim, std::string> claim_cell(const CellConfig& config) {
-  auto robot = hal::claim_serial(config.robot.device);
+  auto robot = claim_link(config.robot.place);
   if (!robot) return std::unexpected{robot.error()};
-  auto scanner = hal::claim_address(config.scanner.host, static_cast<std::uint16_t>(config.scanner.port));
+  auto scanner = claim_link(config.scanner.place);
   if (!scanner) return std::unexpected{scanner.error()};
   return CellClaim{std::move(*scanner), std::move(*robot)};
 }

@@ -19,8 +19,9 @@
 
 namespace moldloft::hal::robot_line {
 
-constexpr std::size_t max_length = 120;  // a V+ string holds 128 characters
-constexpr int last_number = 9999;        // 0001 follows 9999; 0000 marks the lines that change nothing
+constexpr std::uint16_t default_port = 4015;  // where the lines go over TCP
+constexpr std::size_t max_length = 120;       // a V+ string holds 128 characters
+constexpr int last_number = 9999;             // 0001 follows 9999; 0000 marks the lines that change nothing
 // V+ keeps numbers in single precision: integers are exact up to here.
 constexpr std::uint32_t largest_nonce = (1u << 24) - 1;
 

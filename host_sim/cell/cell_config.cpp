@@ -44,6 +44,11 @@ std::string toml_string(std::string_view text) {
   return out + '"';
 }
 
+std::string robot_place(const CellAddresses& a) {
+  return a.robot_port == 0 ? "device = " + toml_string(a.robot_device)
+                           : fmt::format("link = \"tcp\"\nhost = \"127.0.0.1\"\nport = {}", a.robot_port);
+}
+
 }  // namespace
 
 bool is_generated_cell(const std::string& path) {
@@ -66,8 +71,8 @@ std::string cell_toml(const CellDescription& d, const PlateInstance& plate, cons
       d.optics.field_y_mm, d.optics.noise_mm, d.optics.depth_mm);
   if (d.scanner_driver != "psc1") t += fmt::format("driver = \"{}\"\n", d.scanner_driver);
   t += "\n[scanner.mount]\ntranslation_mm = [0, 140, 300]\nzyz_deg = [0, 180, 180]\n";
-  t += fmt::format("\n[robot]\ndevice = {}\nrepeatability_z_mm = {}\n\n[robot.workspace]\n{}",
-                   toml_string(addresses.robot_device), d.drive.errors.z_mm, workspace(d));
+  t += fmt::format("\n[robot]\n{}\nrepeatability_z_mm = {}\n\n[robot.workspace]\n{}", robot_place(addresses),
+                   d.drive.errors.z_mm, workspace(d));
   t += fmt::format("\n[plate]\nthickness_mm = {}\ntable_z_mm = {}\nlargest_mm = [{}, {}]\n",
                    plate.plate->thickness_mm(), plate.table_z_mm, roomy(size.x()), roomy(size.y()));
   t += fmt::format("\n[start]\ncentre_mm = [{:.3f}, {:.3f}, {:.3f}]\nyaw_deg = {:.3f}\n", centre.x(),

@@ -14,6 +14,7 @@ namespace moldloft::host_sim {
 struct CellAddresses {
   std::uint16_t scanner_port = hal::psc1::default_port;
   std::string robot_device = "/dev/ttyS0";
+  std::uint16_t robot_port = 0;  // not 0: TCP on loopback instead of the device
 };
 
 // Whether the file there is one of those, and may be written over.

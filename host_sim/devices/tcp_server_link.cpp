@@ -19,14 +19,14 @@ namespace moldloft::host_sim {
 
 using hal::LinkState;
 
-std::expected<std::unique_ptr<TcpServerLink>, SimError> TcpServerLink::listen_on(std::uint16_t port) {
+std::expected<std::unique_ptr<TcpServerLink>, SimError> TcpServerLink::listen_on(std::uint16_t port,
+                                                                                 std::string_view option) {
   const int listener = ::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   const auto refused = [&] {
     const int error = errno;
     if (listener >= 0) ::close(listener);
-    return std::unexpected(
-        SimError{fmt::format("scanner port {}: {}{}", port, std::strerror(error),
-                             error == EADDRINUSE ? "; choose another with --scanner-port" : "")});
+    return std::unexpected(SimError{fmt::format("{} {}: {}{}", option, port, std::strerror(error),
+                                                error == EADDRINUSE ? "; choose another port" : "")});
   };
   if (listener < 0) return refused();
   const int yes = 1;  // a port that was in use a minute ago may be taken again

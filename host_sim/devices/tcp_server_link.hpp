@@ -21,8 +21,9 @@ namespace moldloft::host_sim {
 
 class TcpServerLink final : public hal::ByteLink {
  public:
-  // Port 0 takes any that is free; port() says which.
-  static std::expected<std::unique_ptr<TcpServerLink>, SimError> listen_on(std::uint16_t port);
+  // Port 0 takes any that is free; port() says which. `option`: what chooses another where this one is taken.
+  static std::expected<std::unique_ptr<TcpServerLink>, SimError> listen_on(
+      std::uint16_t port, std::string_view option = "--scanner-port");
   ~TcpServerLink() override;
   TcpServerLink(const TcpServerLink&) = delete;
   TcpServerLink& operator=(const TcpServerLink&) = delete;

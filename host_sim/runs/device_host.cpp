@@ -45,21 +45,28 @@ void catch_signals() {
 // The robot's end of the line, and the device by which the controller reaches the other end.
 struct RobotLine {
   std::unique_ptr<hal::ByteLink> link;
-  std::string served_on, controllers_device;
+  std::string served_on;
+  CellAddresses controllers;  // what the controller is to be told of it
 };
 
 std::expected<RobotLine, SimError> robot_line(const DeviceOptions& options) {
+  if (options.robot_port) {
+    auto port = TcpServerLink::listen_on(*options.robot_port, "--robot-port");
+    if (!port) return std::unexpected(port.error());
+    const std::uint16_t number = (*port)->port();
+    return RobotLine{std::move(*port), fmt::format("127.0.0.1:{}", number), {.robot_port = number}};
+  }
   if (options.robot_serial.empty()) {
     auto pty = PtyLink::create(options.robot_pty);
     if (!pty) return std::unexpected(pty.error());
     const std::string path = (*pty)->path();
-    return RobotLine{std::move(*pty), path, path};
+    return RobotLine{std::move(*pty), path, {.robot_device = path}};
   }
   // The line's format is the controller's own default: the servers know one robot.
-  auto port = hal::make_serial_link(options.robot_serial, firmware_like::CellConfig{}.robot.baud);
+  auto port = hal::make_serial_link(options.robot_serial, firmware_like::RobotConfig{}.place.baud);
   port->open();
   if (port->state() != hal::LinkState::open) return std::unexpected(SimError{std::string(port->why())});
-  return RobotLine{std::move(port), options.robot_serial, options.controller_serial};
+  return RobotLine{std::move(port), options.robot_serial, {.robot_device = options.controller_serial}};
 }
 
 // What the arm and the laser were made to do, as it happens: whoever tests a controller sees what moved, and when.
@@ -92,14 +99,15 @@ int run_devices(const DeviceOptions& options) {
   if (!plate) return failed(plate.error());
   if (const auto& remarks = plate->plate->remarks(); !remarks.empty())
     say(fmt::format("plate {}: {}\n", plate->plate->name(), remarks));
-  auto scanner = TcpServerLink::listen_on(options.scanner_port);
+  auto scanner = TcpServerLink::listen_on(options.scanner_port, "--scanner-port");
   if (!scanner) return failed(scanner.error());
   const std::uint16_t scanner_port = (*scanner)->port();
   auto robot = robot_line(options);
   if (!robot) return failed(robot.error());
 
   if (!options.cell_toml.empty()) {
-    const CellAddresses here{.scanner_port = scanner_port, .robot_device = robot->controllers_device};
+    CellAddresses here = robot->controllers;
+    here.scanner_port = scanner_port;
     const bool ours = options.force || is_generated_cell(options.cell_toml);
     const auto written =
         firmware_like::write_file(options.cell_toml, cell_toml(options.cell, *plate, here),

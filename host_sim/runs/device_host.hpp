@@ -4,6 +4,7 @@
 
 #include "host_sim/cell/cell_description.hpp"
 
+#include <optional>
 #include <string>
 
 namespace moldloft::host_sim {
@@ -14,8 +15,9 @@ struct DeviceOptions {
   std::string robot_pty = "/tmp/moldloft-robot";
   std::string robot_serial;  // a serial port instead of the pseudo-terminal; empty: none
   std::string controller_serial =
-      "/dev/ttyS0";       // the controller's port, at the other end of that one's cable
-  bool log = false;       // a line for each motion that begins and ends and each exposure
+      "/dev/ttyS0";                         // the controller's port, at the other end of that one's cable
+  std::optional<std::uint16_t> robot_port;  // TCP on loopback instead of both; 0: any that is free
+  bool log = false;                         // a line for each motion that begins and ends and each exposure
   std::string cell_toml;  // where to write a configuration that fits these devices; empty: nowhere
   bool force = false;     // even over a file that this program has not written
 };

@@ -1,5 +1,5 @@
-// The simulated scanner of the second make (hal/triplet/triplet.hpp): exposes when it is asked, sends the scan when it is
-// computed, keeps nothing.
+// The simulated scanner of the second make (hal/triplet/triplet.hpp): exposes when it is asked, sends
+// the scan when it is computed, keeps nothing.
 #pragma once
 
 #include "hal/triplet/triplet.hpp"

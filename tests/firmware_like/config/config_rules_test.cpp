@@ -131,6 +131,7 @@ TEST_CASE("all errors of a file are told, each with its line, in the order of th
           "[robot]\nbaud = 1\nbuad = 2\n[scanner]\nport = 0\nhost = \"a:1\"\n[plate]\nthickness_mm = -1\n") ==
       "cell.toml:2: [robot] baud: 1 is outside 1200 to 921600\n"
       "cell.toml:3: [robot] buad: unknown key; known here: arrival_deg, arrival_mm, baud, device, driver, "
+      "host, link, port, "
       "repeatability_z_mm, "
       "speed_percent, workspace\n"
       "cell.toml:5: [scanner] port: 0 is outside 1 to 65535\n"

@@ -52,11 +52,11 @@ std::string values(const CellConfig& c) {
                      c.device_timeout.count()) +
          fmt::format("{} {} {:.9f} ", c.scanner_wait.count(), c.robot.arrival.distance_mm,
                      c.robot.arrival.turn_rad) +
-         fmt::format("{} {} {} {} {} {} {} {} {} {} {} ", s.driver, s.host, s.port,
+         fmt::format("{} {} {} {} {} {} {} {} {} {} {} ", s.driver, s.place.link + s.place.host, s.place.port,
                      static_cast<int>(s.encoding), s.max_stripes, s.max_points_per_stripe, s.field_x_mm,
                      s.field_y_mm, s.noise_mm, s.depth_mm, mount) +
-         fmt::format("{} {} {} {} {} ", c.robot.driver, c.robot.device, c.robot.baud, c.robot.speed_percent,
-                     c.robot.repeatability_z_mm) +
+         fmt::format("{} {} {} {} {} ", c.robot.driver, c.robot.place.link + c.robot.place.device,
+                     c.robot.place.baud, c.robot.speed_percent, c.robot.repeatability_z_mm) +
          fmt::format("{} {} {} {} {} {} ", range(w.x_mm), range(w.y_mm), range(w.z_mm), range(w.reach_mm),
                      w.max_step_mm, w.max_speed_percent) +
          fmt::format("{} {} {} {} ", c.plate.table_z_mm, c.plate.thickness_mm, c.plate.largest_x_mm,
@@ -122,6 +122,9 @@ std::string changed(const std::string& line) {
                                                                          {"priority", "49"},
                                                                          {"cpu", "0"},
                                                                          {"cpu_latency_us", "-1"}};
+  if (key_of(line) == "link")
+    return !line.starts_with("link = \"tcp\"") ? "link = \"tcp\""
+                                               : "link = \"serial\"\ndevice = \"/dev/ttyS9\"";
   for (const auto& [key, value] : other) {
     if (key == key_of(line)) return key + " = " + value;
   }
@@ -160,7 +163,7 @@ TEST_CASE("every key of the example is read: another value makes another configu
     other.erase(other.begin() + static_cast<std::ptrdiff_t>(i));
     CHECK(values(parsed(joined(other))) == before);
   }
-  CHECK(keys == 48);
+  CHECK(keys == 50);
   CHECK(fixed == 3);
 }
 
@@ -178,6 +181,7 @@ TEST_CASE("the mount is Rz Ry Rz and then the translation") {
 TEST_CASE("what is wrong is told in one line with file, line, key and what is allowed") {
   CHECK(refusal("[robot]\n\nbauds = 9600\n") ==
         "cell.toml:3: [robot] bauds: unknown key; known here: arrival_deg, arrival_mm, baud, device, driver, "
+        "host, link, port, "
         "repeatability_z_mm, speed_percent, workspace");
   CHECK(refusal("\nrobots = 1\n") ==
         "cell.toml:2: robots: unknown key; known here: cell, fit, plate, realtime, robot, scan, scanner, "
@@ -282,4 +286,29 @@ TEST_CASE(
   CHECK(first_difference(text, replaced("[0, 180, 180]", "[0, 180, 181]")) == "scanner.mount.zyz_deg");
   CHECK(first_difference(text, text + "centre_mm = [1, 2, 3]\n") == "start.centre_mm");
   CHECK(first_difference(text + "centre_mm = [1, 2, 3]\n", text) == "start.centre_mm");
+}
+
+TEST_CASE("any device may be reached by any link, and two devices cannot be at one place") {
+  const auto robot_over_tcp =
+      parse_config("schema = 1\n[robot]\nlink = \"tcp\"\nhost = \"10.0.0.7\"\n", "c.toml");
+  REQUIRE_MESSAGE(robot_over_tcp.has_value(), robot_over_tcp.error().what);
+  CHECK(place_of(robot_over_tcp->robot.place) == "10.0.0.7:4015");
+  CHECK(place_of(robot_over_tcp->scanner.place) == "127.0.0.1:4014");
+  const auto scanner_on_a_port =
+      parse_config("schema = 1\n[scanner]\nlink = \"serial\"\ndevice = \"/dev/ttyS1\"\n", "c.toml");
+  REQUIRE_MESSAGE(scanner_on_a_port.has_value(), scanner_on_a_port.error().what);
+  CHECK(place_of(scanner_on_a_port->scanner.place) == "/dev/ttyS1");
+  const auto refusal = [](const std::string& text) {
+    return parse_config("schema = 1\n" + text, "c.toml").error().what;
+  };
+  CHECK(refusal("[robot]\nlink = \"tcp\"\nport = 4014\n") ==
+        "c.toml:4: [robot] host: 127.0.0.1:4014 is the scanner's too; each device has a place of its own");
+  CHECK(refusal("[scanner]\nlink = \"serial\"\n") ==
+        "c.toml:3: [robot] device: /dev/ttyS0 is the scanner's too; each device has a place of its own");
+  CHECK(refusal("[robot]\nlink = \"tcp\"\nhost = \"\"\n") ==
+        "c.toml:4: [robot] host: is empty; write the robot's address");
+  CHECK(refusal("[robot]\nlink = \"usb\"\n") == "c.toml:3: [robot] link: 'usb' is not one of: tcp, serial");
+  // What does not count is not judged.
+  CHECK(parse_config("schema = 1\n[robot]\nhost = \"\"\n", "c.toml").has_value());
+  CHECK(first_difference("[robot]\nlink = \"tcp\"\n", "[robot]\nlink = \"serial\"\n") == "");
 }

@@ -118,6 +118,18 @@ TEST_CASE(
   check_report(out);
 }
 
+TEST_CASE("the robot's lines go over a socket as well, and a plate is measured without any serial port") {
+  const hal::TemporaryFolder folder;
+  const std::string config = folder.file("cell.toml"), out = folder.file("run");
+  ChildProcess devices{
+      {MOLDLOFT_SIM, "devices", "--scanner-port", "0", "--robot-port", "0", "--cell", config}};
+  REQUIRE_MESSAGE(devices.prints("ready: scanner 127.0.0.1:", 20s), devices.err());
+  ChildProcess run{{MOLDLOFT, "run", config, "--out", out}};
+  const auto code = run.wait(run_limit);
+  REQUIRE_MESSAGE(code == firmware_like::exit_done, run.err());
+  check_truth(out);
+}
+
 TEST_CASE("a run that ctrl-C stops, then a power cut, goes on where it was with --resume") {
   const Devices devices;
   const hal::TemporaryFolder folder;
