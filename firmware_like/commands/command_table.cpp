@@ -28,7 +28,8 @@ RunCommand with(const std::shared_ptr<Options>& options, int (*run)(const Option
 
 // Given or not given makes a difference.
 void add_text(CLI::App& to, const char* name, std::optional<std::string>& value, const char* help) {
-  to.add_option_function<std::string>(name, [&value](const std::string& text) { value = text; }, help);
+  to.add_option_function<std::string>(
+      name, [&value](const std::string& text) { value = text; }, help);
 }
 
 RunCommand add_run(CLI::App& to) {

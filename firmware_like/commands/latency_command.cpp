@@ -211,11 +211,8 @@ Json comparison_json(const tasks::Histogram& ours, const CyclictestResult& cycli
     const bool known = a.is_number() && b.is_number();  // cyclictest's least is half a microsecond
     j[name] = known ? Json(a.get<double>() / b.get<double>()) : Json(nullptr);
   };
-  for (const auto& p : percentiles) {
-    const std::string key = p.key;
-    ratio(p.key, "ratio_" + key.substr(0, key.size() - 3));
-  }
-  ratio("max_us", "ratio_max");
+  for (const auto& p : percentiles) ratio(p.key, ratio_key(p));
+  ratio("max_us", ratio_of_maxima);
   j["how"] = "in turns; cyclictest's truncated microseconds n counted as n + 0.5, both in the same buckets";
   return j;
 }
@@ -232,8 +229,8 @@ Json latency_json(const Json& timing) {
     const Json& c = timing["compared"];
     j["ours"] = side(c["ours"], c["ours"]["cycles"]);
     j["cyclictest"] = side(c["cyclictest"], c["cyclictest"]["cycles"]);
-    for (const auto& [key, value] : c.items())
-      if (key.starts_with("ratio_")) j[key] = value;
+    for (const auto& p : percentiles) j[ratio_key(p)] = c[ratio_key(p)];
+    j[ratio_of_maxima] = c[ratio_of_maxima];
     j["how"] = c["how"];
   } else {
     j["ours"] = side(timing["wake_up"], timing["wake_up"]["count"]);

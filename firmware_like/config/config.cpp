@@ -56,7 +56,7 @@ void read_scanner(TomlSection s, ScannerConfig& c) {
   s.number("noise_mm", c.noise_mm, 1e-4, 5);
   s.number("depth_mm", c.depth_mm, 1, 5000);
   TomlSection mount = s.section("mount");
-  std::array<double, 3> translation{0, 140, 300}, zyz{0, 180, 180};
+  std::array<double, 3> translation = default_mount_mm, zyz = default_mount_zyz_deg;
   mount.numbers("translation_mm", translation, -2000, 2000);
   mount.numbers("zyz_deg", zyz, -360, 360);
   mount.finish();
@@ -299,7 +299,7 @@ std::string first_difference(const std::string& text, const std::string& other) 
 
 CellConfig default_config() {
   CellConfig c;
-  c.scanner.tip_from_scanner = mount_from({0, 140, 300}, {0, 180, 180});
+  c.scanner.tip_from_scanner = mount_from(default_mount_mm, default_mount_zyz_deg);
   c.start.centre << 500, 0, 10;
   // A SCARA of 800 mm: a limit that is left out must be a limit all the same.
   c.robot.workspace = {.x_mm = {-800, 800},

@@ -11,12 +11,16 @@
 #include "hal/scanner/psc1.hpp"
 #include "tasks/cell/cell.hpp"
 
+#include <array>
 #include <expected>
 #include <map>
 #include <string>
 #include <vector>
 
 namespace moldloft::firmware_like {
+
+// Where the scanner sits on the robot's tip unless the configuration says otherwise: 140 mm off the flange, half a turn.
+inline constexpr std::array<double, 3> default_mount_mm{0, 140, 300}, default_mount_zyz_deg{0, 180, 180};
 
 struct ConfigError {
   std::string what;  // "cell.toml:12: [robot] baud: ...", a line for each error

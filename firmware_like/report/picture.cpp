@@ -1,5 +1,6 @@
 #include "firmware_like/report/picture.hpp"
 
+#include "firmware_like/report/kit.hpp"
 #include "hal/base/printable_text.hpp"
 
 #include <Eigen/Dense>
@@ -164,22 +165,6 @@ double nice_limit(const PlateField& field) {
     if (step * decade >= *nth) return step * decade;
   }
   return 10 * decade;
-}
-
-// What stands in a title may come from a file's name.
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : hal::printable(text)) {
-    if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '>')
-      out += "&gt;";
-    else
-      out += c;
-  }
-  return out;
 }
 
 // One path for each colour: cells of a colour together, so that the file stays small.

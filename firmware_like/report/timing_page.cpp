@@ -1,5 +1,6 @@
 #include "firmware_like/report/timing_page.hpp"
 
+#include "firmware_like/report/kit.hpp"
 #include "firmware_like/report/log_plot.hpp"
 #include "firmware_like/results/timing_report.hpp"
 #include "hal/base/printable_text.hpp"
@@ -49,29 +50,6 @@ h2{margin-top:22px;break-after:avoid}tr{break-inside:avoid}.wide{overflow:visibl
 th,td{padding:2px 4px}th,.words td,.words td:first-child{white-space:normal}.words td{overflow-wrap:anywhere}
 .s0,.tile,.verdict{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
 )";
-
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : hal::printable(text)) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
 
 std::string figure(const Json& value) {
   if (value.is_null()) return "-";
@@ -183,9 +161,10 @@ std::string wake_up(const Json& t) {
     std::vector<Cell> ratio = {{"ratio"}, {""}, {""}};
     for (const auto& p : percentiles) {
       const std::string key = p.key;
-      ratio.push_back({figure(c, ("ratio_" + key.substr(0, key.size() - 3)).c_str())});
+      ratio.push_back({figure(c, ratio_key(p).c_str())});
     }
-    for (const auto& text : {figure(c, "ratio_max"), std::string{}, std::string{}}) ratio.push_back({text});
+    for (const auto& text : {figure(c, ratio_of_maxima), std::string{}, std::string{}})
+      ratio.push_back({text});
     body +=
         statistics(histogram_head("us"), histogram_row("ours", c.at("ours")) +
                                              histogram_row("cyclictest", c.at("cyclictest")) + row(ratio));

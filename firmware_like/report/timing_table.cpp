@@ -160,10 +160,8 @@ std::string comparison(const Json& t) {
   std::string s = histogram_head("wake-up latency, us");
   s += histogram_row("ours", c.at("ours")) + histogram_row("cyclictest", c.at("cyclictest"));
   std::string line = fmt::format("{:<{}}{:>9}{:>8}", "ratio", name_width, "", "");
-  for (const auto& p : percentiles)
-    line += fmt::format("{:>9}",
-                        figure(c.at("ratio_" + std::string{p.key}.substr(0, std::string{p.key}.size() - 3))));
-  return s + line + fmt::format("{:>9}\n", figure(c.at("ratio_max"))) + "(" + text(c, "how") + ")\n\n";
+  for (const auto& p : percentiles) line += fmt::format("{:>9}", figure(c.at(ratio_key(p))));
+  return s + line + fmt::format("{:>9}\n", figure(c.at(ratio_of_maxima))) + "(" + text(c, "how") + ")\n\n";
 }
 
 }  // namespace

@@ -177,6 +177,11 @@ std::string moment_s(const Json& j, const char* key) {
   return known ? fmt::format("{:.3f}", j.at(key).get<double>() / 1000) : "-";
 }
 
+std::string ratio_key(const Percentile& p) {
+  const std::string_view key = p.key;
+  return "ratio_" + std::string{key.substr(0, key.size() - std::string_view{"_us"}.size())};
+}
+
 double micros(hal::Duration d) { return std::chrono::duration<double, std::micro>(d).count(); }
 
 Json histogram_json(const Histogram& h) {

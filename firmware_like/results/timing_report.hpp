@@ -39,6 +39,10 @@ inline constexpr std::array<Percentile, 4> percentiles{{{0.5, "p50_us", "p50"},
                                                         {0.999, "p999_us", "p99.9"},
                                                         {0.9999, "p9999_us", "p99.99"}}};
 
+// In `compared`, ours over cyclictest's: "ratio_p99"; of the maxima.
+std::string ratio_key(const Percentile&);
+inline constexpr const char* ratio_of_maxima = "ratio_max";
+
 double micros(hal::Duration);
 Json histogram_json(const tasks::Histogram&);
 tasks::Histogram histogram_from(

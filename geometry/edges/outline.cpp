@@ -1,5 +1,7 @@
 #include "geometry/edges/outline.hpp"
 
+#include "geometry/tukey.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -25,7 +27,6 @@ constexpr std::size_t fewest_points = 5;  // of a side
 constexpr int rounds = 3;  // hints are off by millimetres: the third round moves corners by microns
 constexpr int passes = 6;  // of one side in one round: plain, absolute, then Tukey
 
-constexpr double tukey_reach = 4.685;  // 95 % efficiency on Gaussian noise
 constexpr double first_gate =
     0.15;  // of the side's length: how far a bent side may leave the chord of the hints
 constexpr double later_gate_mm = 5;  // about the first fit
@@ -255,10 +256,10 @@ bool OutlineBuilder::add_points(std::span<const std::uint32_t> members) {
   const std::size_t end = std::min(members.size(), pass.next + points_a_step);
   for (; pass.next < end; ++pass.next) {
     const std::uint32_t i = members[pass.next];
-    const double r = std::abs(residual_[i]), reach = tukey_reach * side.scale;
+    const double r = std::abs(residual_[i]);
     double weight = 1;
     if (pass_ == 1) weight = side.scale / std::max(r, side.scale);
-    if (pass_ > 1) weight = r < reach ? std::pow(1 - (r / reach) * (r / reach), 2) : 0;
+    if (pass_ > 1) weight = tukey_weight(r, side.scale);
     if (weight == 0) continue;
     const double share = std::clamp(side.share_at(points_[i]), 0.0, 1.0), z = side.offset_at(points_[i]);
     const int k = find_span(knots, share);
@@ -349,8 +350,7 @@ bool OutlineBuilder::end_pass(std::span<const std::uint32_t> members) {
   side.scale = std::max(1.4826 * scratch_[scratch_.size() / 2], 0.3 * settings_.noise_mm);
   if (++pass_ < passes) return false;
   for (const std::uint32_t i : members) {
-    const double r = std::abs(residual_[i]), reach = tukey_reach * side.scale;
-    const double weight = r < reach ? std::pow(1 - (r / reach) * (r / reach), 2) : 0;
+    const double r = std::abs(residual_[i]), weight = tukey_weight(r, side.scale);
     side.squares += weight * r * r, side.weights += weight;
     if (weight > 0) side.largest = std::max(side.largest, r);
   }

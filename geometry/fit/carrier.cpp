@@ -2,6 +2,7 @@
 
 #include "geometry/fit/smooth_sides.hpp"
 #include "geometry/splines/closed_polygon.hpp"
+#include "geometry/splines/convex_hull.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -17,8 +18,6 @@ constexpr double joint_mm = 1e-6;
 constexpr double least_share = 1e-6;    // of the squared extent: less area is none
 constexpr double rounding_room = 1e-9;  // of the extent
 constexpr int most_chords_a_span = 4096;
-
-double cross_product(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 // What one needs of a span of a curve: its ends, and derivatives that are exact there.
 struct Piece {
@@ -78,25 +77,6 @@ void take_curve(const PlanCurve& curve, const Vector2d& direction, Extent& exten
       if (root > 0 && root < h) extent.take(direction.dot(curve.at(piece.a + root).value));
     }
   }
-}
-
-// Andrew's monotone chain, counter-clockwise.
-std::vector<Vector2d> convex_hull(std::vector<Vector2d> points) {
-  std::ranges::sort(points, [](const Vector2d& a, const Vector2d& b) {
-    return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
-  });
-  std::vector<Vector2d> hull;
-  const auto add = [&](const Vector2d& p, std::size_t keep) {
-    while (hull.size() >= keep + 2 &&
-           cross_product(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0)
-      hull.pop_back();
-    hull.push_back(p);
-  };
-  for (const Vector2d& p : points) add(p, 0);
-  const std::size_t lower = hull.size() - 1;
-  for (std::size_t i = points.size() - 1; i-- > 0;) add(points[i], lower);
-  hull.pop_back();
-  return hull;
 }
 
 // The direction of the hull's edge on which the least rectangle stands, turned to within 45 degrees of x.

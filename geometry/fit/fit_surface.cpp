@@ -3,6 +3,7 @@
 #include "geometry/fit/fit_checks.hpp"
 #include "geometry/fit/robust_weights.hpp"
 #include "geometry/splines/band_condition.hpp"
+#include "geometry/tukey.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
-// Tukey's biweight for streamed points: weights from residuals, and their scale from a histogram, so that
-// no residual is kept.
+// The scale of streamed residuals for Tukey's biweight (geometry/tukey.hpp), from a histogram, so that no
+// residual is kept.
 //
-// Source       Beaton and Tukey 1974; scale = 1.4826 median |r| (Huber 1981)
+// Source       scale = 1.4826 median |r| (Huber 1981)
 // Accuracy     the median to 1 % (64 bins an octave, straight line within a bin)
 // Cost         5 ns a residual
 // Allocation   none
@@ -13,13 +13,6 @@
 #include <cstdint>
 
 namespace moldloft::geometry {
-
-constexpr double tukey_cutoff = 4.685;  // 95 % efficiency on Gaussian noise
-
-inline double tukey_weight(double residual, double scale) {
-  const double x = residual / (tukey_cutoff * scale), left = 1 - x * x;
-  return left > 0 ? left * left : 0;
-}
 
 class AbsoluteMedian {
  public:

@@ -1,5 +1,7 @@
 #include "geometry/inspection/localization.hpp"
 
+#include "geometry/tukey.hpp"
+
 #include <Eigen/Cholesky>
 
 #include <algorithm>
@@ -19,7 +21,6 @@ using Square = Eigen::Matrix<double, 6, 6>;
 
 constexpr double undetermined = 1e-11;     // least to largest eigenvalue of the normal matrix; slopes of 3e-6
 constexpr double flat_spread = 1e-20;      // second to first principal mean square: 1e-10 of the length
-constexpr double tukey_factor = 4.685;     // 95 % efficient on normal noise
 constexpr double sigma_from_mad = 1.4826;  // of normal noise
 constexpr double weak_ratio = 5;
 constexpr double penetration_mm = 1e-9;
@@ -295,7 +296,7 @@ class Alignment {
     double spread = spread_mm(), least = spread, damping = 0;
     RigidMotion best = pose_;
     // After a search narrower: outliers that stand close together widen the spread.
-    const double factor = plain_first ? tukey_factor : searched_factor;
+    const double factor = plain_first ? tukey_cutoff : searched_factor;
     if (!plain_first) sums_ = pass(std::max(factor * spread, 1e-9));
     for (int k = 0, idle = 0; k < rough_passes && idle < most_idle && iterations_ < settings_.most_iterations;
          ++k) {
@@ -403,7 +404,7 @@ class Alignment {
   bool settle_robustly() {
     system_.pass(pose_);
     while (iterations_ < settings_.most_iterations) {
-      tukey_mm_ = std::max(tukey_factor * spread_mm(tukey_factor * spread_mm()), 1e-9);
+      tukey_mm_ = std::max(tukey_cutoff * spread_mm(tukey_cutoff * spread_mm()), 1e-9);
       sums_ = pass(tukey_mm_);
       const Vector step = step_of(sums_, 0);
       if (!step.allFinite()) return false;
@@ -501,9 +502,9 @@ class Alignment {
       const PointPlaneSums robust = system_.pass(pose_, tukey_mm_);
       const double count = static_cast<double>(robust.points), slope = robust.psi_slope / count;
       const double factor = robust.psi_square / std::max(1.0, spare) / (slope * slope);
-      if (settings_.sigma_mm == 0) found.sigma_mm = tukey_mm_ / tukey_factor;
+      if (settings_.sigma_mm == 0) found.sigma_mm = tukey_mm_ / tukey_cutoff;
       variance = settings_.sigma_mm > 0
-                     ? variance * factor * tukey_factor * tukey_factor / (tukey_mm_ * tukey_mm_)
+                     ? variance * factor * tukey_cutoff * tukey_cutoff / (tukey_mm_ * tukey_mm_)
                      : factor;
     }
     if (free_.count == 0) return found;

@@ -1,5 +1,7 @@
 #include "host_sim/base/plan_polygon.hpp"
 
+#include "geometry/splines/convex_hull.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -63,24 +65,8 @@ double distance_to_outline(PlanPoints polygon, const Eigen::Vector2d& p) noexcep
   return std::sqrt(best);
 }
 
-std::vector<Eigen::Vector2d> convex_hull(PlanPoints points) {  // Andrew's monotone chain
-  std::vector<Eigen::Vector2d> sorted(points.begin(), points.end());
-  std::sort(sorted.begin(), sorted.end(),
-            [](const auto& a, const auto& b) { return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y()); });
-  std::vector<Eigen::Vector2d> hull;
-  const auto add = [&hull](const Eigen::Vector2d& p, std::size_t keep) {
-    while (hull.size() >= keep + 2 && turn_of(hull[hull.size() - 2], hull.back(), p) <= 0) hull.pop_back();
-    hull.push_back(p);
-  };
-  for (const auto& p : sorted) add(p, 0);
-  const std::size_t lower = hull.size() - 1;
-  for (std::size_t i = sorted.size() - 1; i-- > 0;) add(sorted[i], lower);
-  hull.pop_back();
-  return hull;
-}
-
 std::array<Eigen::Vector2d, 4> largest_quadrilateral(PlanPoints points) {
-  const auto hull = convex_hull(points);
+  const auto hull = geometry::convex_hull({points.begin(), points.end()});
   const std::size_t n = hull.size();
   const auto area = [&](std::size_t i, std::size_t j, std::size_t k) {  // doubled, of the triangle
     return std::abs(cross(hull[j % n] - hull[i % n], hull[k % n] - hull[i % n]));

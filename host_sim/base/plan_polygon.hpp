@@ -21,7 +21,6 @@ bool is_convex(PlanPoints) noexcept;
 double distance_to_outline(PlanPoints, const Eigen::Vector2d&) noexcept;
 
 // The convex hull, counter-clockwise. Cost n log n.
-std::vector<Eigen::Vector2d> convex_hull(PlanPoints);
 
 // The four hull vertices that span the quadrilateral of largest area, counter-clockwise, beginning with the
 // one of smallest x + y: what one calls the corners of an approximately four-sided outline. Cost quadratic in

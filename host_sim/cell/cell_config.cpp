@@ -1,9 +1,11 @@
 #include "host_sim/cell/cell_config.hpp"
 
+#include "firmware_like/config/config.hpp"
 #include "hal/base/printable_text.hpp"
 #include "tasks/planning/tool_pose.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 #include <fstream>
@@ -70,7 +72,9 @@ std::string cell_toml(const CellDescription& d, const PlateInstance& plate, cons
       addresses.scanner_port, d.optics.stripes, d.optics.points_per_stripe, d.optics.field_x_mm,
       d.optics.field_y_mm, d.optics.noise_mm, d.optics.depth_mm);
   if (d.scanner_driver != "psc1") t += fmt::format("driver = \"{}\"\n", d.scanner_driver);
-  t += "\n[scanner.mount]\ntranslation_mm = [0, 140, 300]\nzyz_deg = [0, 180, 180]\n";
+  t += fmt::format("\n[scanner.mount]\ntranslation_mm = [{}]\nzyz_deg = [{}]\n",
+                   fmt::join(firmware_like::default_mount_mm, ", "),
+                   fmt::join(firmware_like::default_mount_zyz_deg, ", "));
   t += fmt::format("\n[robot]\n{}\nrepeatability_z_mm = {}\n\n[robot.workspace]\n{}", robot_place(addresses),
                    d.drive.errors.z_mm, workspace(d));
   t += fmt::format("\n[plate]\nthickness_mm = {}\ntable_z_mm = {}\nlargest_mm = [{}, {}]\n",

@@ -1,6 +1,7 @@
 // Meshes as plates: laid flat, repaired, and refused with a true word where they are no single sheet.
 #include "host_sim/plates/mesh_plate.hpp"
 
+#include "geometry/splines/convex_hull.hpp"
 #include "host_sim/base/plan_polygon.hpp"
 #include "host_sim/meshes/mesh_weld.hpp"
 #include "host_sim/plates/outline_grid.hpp"
@@ -304,7 +305,7 @@ TEST_CASE("the largest quadrilateral is the one that trying all of them finds") 
   for (int trial = 0; trial < 40; ++trial) {
     std::vector<Eigen::Vector2d> points;
     for (int k = 0; k < 5 + trial; ++k) points.emplace_back(place(random), 0.5 * place(random));
-    const auto hull = convex_hull(points);
+    const auto hull = geometry::convex_hull({points.begin(), points.end()});
     double best = 0;
     for (std::size_t a = 0; a < hull.size(); ++a)
       for (std::size_t b = a + 1; b < hull.size(); ++b)
