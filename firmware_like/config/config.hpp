@@ -19,7 +19,8 @@
 
 namespace moldloft::firmware_like {
 
-// Where the scanner sits on the robot's tip unless the configuration says otherwise: 140 mm off the flange, half a turn.
+// Where the scanner sits on the robot's tip unless the configuration says otherwise: 140 mm off the flange,
+// turned by half a turn.
 inline constexpr std::array<double, 3> default_mount_mm{0, 140, 300}, default_mount_zyz_deg{0, 180, 180};
 
 struct ConfigError {

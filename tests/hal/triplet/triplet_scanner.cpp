@@ -12,34 +12,30 @@ using Kind = hal::ScannerEvent::Kind;
 
 namespace {
 
-constexpr hal::Duration connect_limit = 2s, greeting_limit = 1s, scan_limit = 2s, back_off = 200ms;
+constexpr hal::Duration greeting_limit = 1s, scan_limit = 2s;
 constexpr int most_attempts = 3;
 constexpr std::size_t bytes_a_tick = 32u << 10, points_a_tick = 2048;
 
 }  // namespace
 
 TripletScanner::TripletScanner(hal::ByteLink& link, std::size_t max_stripes, std::size_t max_points)
-    : link_{link}, message_(largest_scan(max_stripes, max_points)), frame_{max_stripes, max_points} {}
-
-void TripletScanner::open(hal::Instant now) {
-  have_ = outgoing_size_ = 0;
-  packed_ = false;
-  phase_ = Phase::opening;
-  deadline_ = now + connect_limit;
-  link_.open();
-}
+    : session_{link, {.outbox_bytes = 64}},
+      message_(largest_scan(max_stripes, max_points)),
+      frame_{max_stripes, max_points} {}
 
 void TripletScanner::lose(hal::Instant now, std::string_view why) {
   why_ = why;
-  link_.close();
+  session_.lose(now);
   if (std::exchange(announced_, false)) events_.push({Kind::lost, shot_, why_});
-  phase_ = Phase::waiting;
-  deadline_ = now + back_off;
+  have_ = 0;
+  packed_ = false;
+  phase_ = Phase::offline;
 }
 
 void TripletScanner::send(Type type, std::uint32_t id, std::size_t body_size) {
-  std::memcpy(outgoing_.data() + head_size, &id, body_size);
-  outgoing_size_ = finish(type, body_size, outgoing_);
+  std::array<std::byte, head_size + sizeof id> message;
+  std::memcpy(message.data() + head_size, &id, body_size);
+  session_.write(std::span{message}.first(finish(type, body_size, message)));
 }
 
 bool TripletScanner::trigger(std::uint32_t shot_id, hal::Instant now) {
@@ -71,23 +67,22 @@ hal::ScannerState TripletScanner::state() const {
 }
 
 void TripletScanner::receive(hal::Instant now) {
-  if (phase_ == Phase::idle || phase_ == Phase::waiting) return;
-  const auto link = link_.state();
-  if (link == hal::LinkState::lost) return lose(now, link_.why());
-  if (phase_ == Phase::opening && link == hal::LinkState::open) {
+  const auto news = session_.receive();
+  if (news == hal::DeviceSession::News::lost) return lose(now, session_.why());
+  if (news == hal::DeviceSession::News::opened) {
     phase_ = Phase::greeting;
     deadline_ = now + greeting_limit;
     send(Type::hello, 0, 0);
   }
   if (packed_) unpack(points_a_tick);
-  for (std::size_t budget = bytes_a_tick; budget > 0 && !packed_ && phase_ >= Phase::greeting;) {
+  for (std::size_t budget = bytes_a_tick; budget > 0 && !packed_ && phase_ != Phase::offline;) {
     const auto head = decode_head(std::span{message_}.first(have_));
     if (have_ >= head_size && (!head || head->body_size > message_.size() - head_size))
       return lose(now, "what comes from the scanner's port is no message of this make");
     const std::size_t wanted = head ? head_size + head->body_size : head_size;
     const std::size_t count =
-        link_.read(std::span{message_}.subspan(have_, std::min(budget, wanted - have_)));
-    have_ += count, received_ += count, budget -= count;
+        session_.read(std::span{message_}.subspan(have_, std::min(budget, wanted - have_)));
+    have_ += count, budget -= count;
     if (head && have_ == wanted) {
       take_message(now);
     } else if (count == 0) {
@@ -117,6 +112,7 @@ void TripletScanner::take_info(std::span<const std::byte> body, hal::Instant now
   info_.sensor = std::string_view{info.name.data(), static_cast<std::size_t>(end - info.name.begin())};
   info_ = {info_.sensor, 1, info.stripes, info.stripes * info.points, info.field_x_mm, info.field_y_mm,
            info.depth_mm};
+  session_.greeted();
   phase_ = Phase::ready;
   announced_ = true;
   why_ = "";
@@ -134,7 +130,7 @@ void TripletScanner::take_scan(std::span<const std::byte> body, hal::Instant now
   if (frame_.shot_id != shot_) return;
   frame_.session_id = info_.session_id;
   frame_.arrived = now;
-  frame_offset_ = received_ - body.size();
+  frame_offset_ = session_.received() - body.size();
   frame_bytes_ = static_cast<std::uint32_t>(body.size());
   unpacked_ = 0;
   packed_ = frame_.point_count > 0;
@@ -152,7 +148,9 @@ void TripletScanner::unpack(std::size_t at_most_points) {
 }
 
 void TripletScanner::transmit(hal::Instant now) {
-  if (phase_ == Phase::waiting && now >= deadline_) return open(now);
+  if (session_.transmit(now) == hal::DeviceSession::News::no_connection)
+    return lose(now, "the scanner does not answer the connection request");
+  if (phase_ == Phase::greeting && now >= deadline_) return lose(now, "the scanner does not answer");
   if (phase_ == Phase::exposing && now >= deadline_) {
     if (attempts_++ < most_attempts) {
       deadline_ = now + scan_limit;
@@ -162,12 +160,7 @@ void TripletScanner::transmit(hal::Instant now) {
       events_.push({Kind::shot_failed, std::exchange(shot_, 0), "the scanner sends no scan"});
     }
   }
-  if ((phase_ == Phase::opening || phase_ == Phase::greeting) && now >= deadline_)
-    return lose(now, "the scanner does not answer");
-  if (phase_ < Phase::greeting || outgoing_size_ == 0) return;
-  const std::size_t count = link_.write(std::span{outgoing_}.first(outgoing_size_));
-  std::copy(outgoing_.begin() + static_cast<std::ptrdiff_t>(count), outgoing_.end(), outgoing_.begin());
-  outgoing_size_ -= count;
+  session_.flush();
 }
 
 }  // namespace moldloft::triplet

@@ -5,7 +5,7 @@
 #pragma once
 
 #include "hal/base/event_queue.hpp"
-#include "hal/links/byte_link.hpp"
+#include "hal/links/device_session.hpp"
 #include "hal/scanner/scanner.hpp"
 #include "hal/triplet/triplet.hpp"
 
@@ -17,7 +17,7 @@ class TripletScanner final : public hal::Scanner {
  public:
   TripletScanner(hal::ByteLink&, std::size_t max_stripes, std::size_t max_points);
 
-  void start(hal::Instant now) override { open(now); }
+  void start(hal::Instant now) override { session_.start(now); }
   void receive(hal::Instant now) override;
   void transmit(hal::Instant now) override;
   bool trigger(std::uint32_t shot_id, hal::Instant now) override;
@@ -32,30 +32,30 @@ class TripletScanner final : public hal::Scanner {
   std::uint64_t frame_offset() const override { return frame_offset_; }
   std::uint32_t frame_bytes() const override { return frame_bytes_; }
   std::string_view why() const override { return why_; }
-  std::size_t plan_bytes() const override { return sizeof *this + message_.size() + 13 * frame_.x.size(); }
+  std::size_t plan_bytes() const override {
+    return sizeof *this + session_.plan_bytes() + message_.size() + 13 * frame_.x.size();
+  }
 
  private:
-  enum class Phase : std::uint8_t { idle, waiting, opening, greeting, ready, exposing };
+  enum class Phase : std::uint8_t { offline, greeting, ready, exposing };
 
-  void open(hal::Instant now);
   void lose(hal::Instant now, std::string_view why);
   void send(Type, std::uint32_t id, std::size_t body_size);
   void take_message(hal::Instant now);
   void take_info(std::span<const std::byte> body, hal::Instant now);
   void take_scan(std::span<const std::byte> body, hal::Instant now);
 
-  hal::ByteLink& link_;
+  hal::DeviceSession session_;
   std::vector<std::byte> message_;  // the one on its way, or the one whose points are not all unpacked
   hal::Frame frame_;
   hal::ScannerInfo info_;
   hal::EventQueue<hal::ScannerEvent, 8> events_;
-  std::array<std::byte, head_size + 4> outgoing_{};
-  std::size_t have_ = 0, outgoing_size_ = 0, unpacked_ = 0;
-  std::uint64_t received_ = 0, frame_offset_ = 0;
+  std::size_t have_ = 0, unpacked_ = 0;
+  std::uint64_t frame_offset_ = 0;
   std::uint32_t frame_bytes_ = 0, shot_ = 0;
   int attempts_ = 0;
   bool packed_ = false, announced_ = false;
-  Phase phase_ = Phase::idle;
+  Phase phase_ = Phase::offline;
   hal::Instant deadline_{0};
   hal::Message why_ = "not started yet";
 };

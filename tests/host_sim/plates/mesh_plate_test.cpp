@@ -305,7 +305,7 @@ TEST_CASE("the largest quadrilateral is the one that trying all of them finds") 
   for (int trial = 0; trial < 40; ++trial) {
     std::vector<Eigen::Vector2d> points;
     for (int k = 0; k < 5 + trial; ++k) points.emplace_back(place(random), 0.5 * place(random));
-    const auto hull = geometry::convex_hull({points.begin(), points.end()});
+    const auto hull = moldloft::geometry::convex_hull({points.begin(), points.end()});
     double best = 0;
     for (std::size_t a = 0; a < hull.size(); ++a)
       for (std::size_t b = a + 1; b < hull.size(); ++b)
