@@ -110,7 +110,7 @@ RunCommand add_report(CLI::App& to) {
 
 RunCommand add_machines(CLI::App&) {
   return [] {
-    show(machine_diagrams());
+    show(cell_diagrams() + "\n" + driver_diagrams());
     return static_cast<int>(exit_done);
   };
 }
