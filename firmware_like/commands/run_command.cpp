@@ -88,13 +88,14 @@ std::string how_it_ended(const Controller& controller, const RunOptions& options
     return fmt::format("{}. What was measured is saved in {} (overview.svg shows it); then begin a new run",
                        what, folder);
   }
+  const std::string saved =
+      controller.recorder().store_failed() ? "What was stored before is kept" : "Everything so far is saved";
   const bool too_small = cell.cause() == tasks::HoldCause::plan && cell.state() == tasks::CellState::held;
   const std::string again = options.go_on.empty()
                                 ? fmt::format("moldloft run {} --out {} --resume",
                                               shell_word(options.config_path), shell_word(folder))
                                 : options.go_on;
-  return fmt::format("{}. Everything so far is saved; to go on{}: {}", what, too_small ? " after that" : "",
-                     again);
+  return fmt::format("{}. {}; to go on{}: {}", what, saved, too_small ? " after that" : "", again);
 }
 
 // Nothing is left to measure: neither the devices nor the folder are touched. A service manager that waits for READY

@@ -50,6 +50,7 @@ tasks::CellSettings cell_settings(const CellConfig& c) {
   s.workspace = c.robot.workspace;
   s.device_timeout = c.device_timeout;
   s.scanner_wait = c.scanner_wait;
+  s.disk_wait = c.disk_wait;
   s.arrival = c.robot.arrival;
   s.max_stripes = static_cast<std::size_t>(c.scanner.max_stripes);
   s.max_points = s.max_stripes * static_cast<std::size_t>(c.scanner.max_points_per_stripe);

@@ -118,6 +118,9 @@ void read_rest(TomlSection& file, CellConfig& c) {
   double wait_s = std::chrono::duration<double>(c.scanner_wait).count();
   cell.number("scanner_wait_s", wait_s, 1, 86400);
   c.scanner_wait = std::chrono::duration_cast<hal::Duration>(std::chrono::duration<double>(wait_s));
+  double disk_s = std::chrono::duration<double>(c.disk_wait).count();
+  cell.number("disk_wait_s", disk_s, 1, 86400);
+  c.disk_wait = std::chrono::duration_cast<hal::Duration>(std::chrono::duration<double>(disk_s));
   cell.finish();
 
   TomlSection plate = file.section("plate");
@@ -279,8 +282,9 @@ std::string first_difference(const std::string& text, const std::string& other) 
   flatten(toml::parse(text), "", a);
   flatten(toml::parse(other), "", b);
   for (auto* keys : {&a, &b}) {
-    for (const char* no_matter : {"cell.name", "cell.device_timeout_s", "cell.scanner_wait_s",
-                                  "robot.arrival_mm", "robot.arrival_deg", "plate.largest_mm"}) {
+    for (const char* no_matter :
+         {"cell.name", "cell.device_timeout_s", "cell.scanner_wait_s", "cell.disk_wait_s", "robot.arrival_mm",
+          "robot.arrival_deg", "plate.largest_mm"}) {
       keys->erase(no_matter);
     }
     for (const char* section : {"scanner", "robot"})

@@ -19,8 +19,8 @@ tasks::CellSettings settings_for(const CellConfig& config, const ControllerOptio
   tasks::CellSettings s = cell_settings(config);
   s.epoch = options.epoch;
   s.devices = options.devices;
-  // Whoever can command the cell decides how long a lost scanner is waited for.
-  s.scanner_wait = options.attended ? hal::Duration::max() : config.scanner_wait;
+  // Whoever can command the cell decides how long a lost scanner and a full disk are waited for.
+  if (options.attended) s.scanner_wait = s.disk_wait = hal::Duration::max();
   return s;
 }
 

@@ -115,7 +115,7 @@ std::string awaited_text(const tasks::CellProgress& p, const Surroundings& aroun
     case Awaited::arm_at_rest:
       return "waiting for the arm to come to rest";
     case Awaited::disk:
-      return "waiting for the disk to take records again";
+      return p.why.empty() ? "waiting for the disk to take records again" : "";  // that says it
     case Awaited::word_unhold:
       return around.has_operator ? "waiting for an operator: moldloft tell unhold, or stop" : "";
     case Awaited::word_clear:

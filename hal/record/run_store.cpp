@@ -53,7 +53,7 @@ StoreError error_of(int code, const std::string& path, std::string_view detail) 
   const std::string where = path + ": ";
   switch (code & 0xFF) {
     case SQLITE_FULL:
-      return {where + "the disk is full: free some space, the run goes on by itself then"};
+      return {where + "the disk is full: free some space"};
     case SQLITE_READONLY:
     case SQLITE_PERM:
     case SQLITE_CANTOPEN:

@@ -59,7 +59,8 @@ void run_to_rest(Controller& controller, const SimulatedCell& cell, hal::Clock& 
   controller.start();
   for (int ticks = 1; controller.tick() && clock.now() < options.time_limit; ++ticks) {
     if (options.on_tick) options.on_tick(cell, clock.now());
-    if (ticks % ticks_between_drains == 0) controller.recorder().drain(cell.store);
+    const bool takes = !options.disk_takes || options.disk_takes();
+    if (takes && ticks % ticks_between_drains == 0) controller.recorder().drain(cell.store);
     if (options.on_progress && ticks % ticks_between_reports == 0)
       options.on_progress(controller.cell().progress());
   }

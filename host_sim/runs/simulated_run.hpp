@@ -43,6 +43,7 @@ struct SimulatedRunOptions {
   std::function<void(const PlateInstance&)> on_plate;               // once, before the run is begun
   std::function<void(const tasks::CellProgress&)> on_progress;      // now and then, for a terminal
   std::function<void(const SimulatedCell&, hal::Instant)> on_tick;  // after every tick: faults come from here
+  std::function<bool()> disk_takes;  // false: nothing reaches the disk for now; empty: it always does
   hal::Duration time_limit =
       std::chrono::hours{2};  // of cell time: a run that never rests is a defect, and ends here
 };

@@ -326,8 +326,7 @@ void Cell::advance_state() {
              hal::Message::format("no scanner for {} s ({:.80}): bring it back, then go on",
                                   settings_.scanner_wait / 1s, scanner_.why()));
       }
-      if (cause_ == HoldCause::recorder && recorder_.room_for_frame() && !recorder_.store_failed())
-        apply(CellEvent::unhold);
+      if (cause_ == HoldCause::recorder) wait_for_disk();
       return;
     case CellState::unholding:
       if (!settings_.devices || devices_ready()) apply(CellEvent::done);

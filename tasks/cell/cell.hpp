@@ -51,6 +51,7 @@ struct CellSettings {
   int max_attempts = 3;             // of one shot, before the cell holds
   Duration device_timeout = 10s;    // for scanner and robot to become ready at the start
   Duration scanner_wait = Duration::max();  // for one that is lost; then a person is waited for
+  Duration disk_wait = Duration::max();     // likewise for one that is full or hangs
   Arrival arrival;
   std::uint32_t epoch = 1;  // of this run's shot ids (shot_archive.hpp)
   bool devices = true;      // false: only archived shots, nothing moves
@@ -136,6 +137,8 @@ class Cell final : public Task {
   // cell_shots.cpp: one shot after another
   void want(const ShotPlace&, hal::ShotPurpose) MOLDLOFT_NONBLOCKING;
   void sequence() MOLDLOFT_NONBLOCKING;
+  void hold_without_room() MOLDLOFT_NONBLOCKING;
+  void wait_for_disk() MOLDLOFT_NONBLOCKING;
   void apply(ShotEvent) MOLDLOFT_NONBLOCKING;
   void carry_out(ShotAction) MOLDLOFT_NONBLOCKING;
   void drive() MOLDLOFT_NONBLOCKING;
@@ -173,6 +176,7 @@ class Cell final : public Task {
   const ShotArchive* archive_;
 
   Instant now_{0}, entered_{0}, started_{0}, last_account_{0}, last_frame_{0}, surface_ready_{0};
+  Instant no_room_since_ = Instant::max();
   std::atomic<int> commands_{0};  // a bit for each CellEvent
   CellState state_ = CellState::idle;
   Phase phase_ = Phase::none;

@@ -2,6 +2,7 @@
 #include "tasks/cell/cell.hpp"
 #include "tasks/planning/tool_pose.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -9,6 +10,29 @@
 namespace moldloft::tasks {
 
 using hal::ShotPurpose;
+
+namespace {
+
+// A disk that writes back what it has taken may stand for seconds; the arm stands meanwhile, and nothing is said.
+constexpr Duration longest_without_room = 5s;
+
+// A path goes first where a message has no place for all of it: what is wrong stands at the end.
+hal::Message end_of(std::string_view text) MOLDLOFT_NONBLOCKING {
+  constexpr std::size_t kept = 100;
+  if (text.size() <= kept) return text;
+  text.remove_prefix(text.size() - kept);
+  while (!text.empty() && (static_cast<unsigned char>(text.front()) & 0xC0u) == 0x80u) text.remove_prefix(1);
+  return hal::Message::format("...{}", text);
+}
+
+hal::Message waiting_for_room(std::string_view why, Duration limit) MOLDLOFT_NONBLOCKING {
+  if (limit == Duration::max())
+    return hal::Message::format("{}; waiting until there is room (stop ends the run)", end_of(why).view());
+  return hal::Message::format("{}; waiting {} s for room (ctrl-C ends the run)", end_of(why).view(),
+                              limit / 1s);
+}
+
+}  // namespace
 
 void Cell::want(const ShotPlace& place, ShotPurpose purpose) {
   Order order;
@@ -41,8 +65,34 @@ void Cell::sequence() {
     if (robot_.state() == hal::RobotState::ready) apply(ShotEvent::order);
   }
   if (shot_state_ == ShotState::in_place && may_expose()) apply(ShotEvent::clear);
-  if (shot_state_ == ShotState::in_place && recorder_.store_failed())
-    hold(HoldCause::recorder, recorder_.store_error());
+  if (shot_state_ == ShotState::in_place) hold_without_room();
+}
+
+// A shot is waited with while the records of those before are still on their way to the disk: for moments where it is
+// slow, for good where it hangs.
+void Cell::hold_without_room() {
+  if (recorder_.room_for_frame()) {
+    no_room_since_ = Instant::max();
+    return;
+  }
+  no_room_since_ = std::min(no_room_since_, now_);
+  if (recorder_.store_failed()) {
+    hold(HoldCause::recorder, waiting_for_room(recorder_.store_error().view(), settings_.disk_wait));
+  } else if (now_ - no_room_since_ > longest_without_room) {
+    hold(HoldCause::recorder,
+         waiting_for_room("the disk does not take what is measured: too slow, or it hangs",
+                          settings_.disk_wait));
+  }
+}
+
+// Held: goes on when there is room. Where nobody could say so, not for ever.
+void Cell::wait_for_disk() {
+  if (recorder_.room_for_frame()) return apply(CellEvent::unhold);
+  if (now_ - entered_ <= settings_.disk_wait) return;
+  const hal::Message error =
+      recorder_.store_failed() ? recorder_.store_error() : hal::Message{"the disk hangs"};
+  hold(HoldCause::person, hal::Message::format("nothing could be stored for {} s: {}",
+                                               settings_.disk_wait / 1s, end_of(error).view()));
 }
 
 bool Cell::awaits_frame() const {

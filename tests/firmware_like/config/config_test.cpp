@@ -50,8 +50,8 @@ std::string values(const CellConfig& c) {
   const auto& w = c.robot.workspace;
   return fmt::format("{} {} {} {} ", c.name, c.tick.count(), static_cast<int>(c.missed_ticks),
                      c.device_timeout.count()) +
-         fmt::format("{} {} {:.9f} ", c.scanner_wait.count(), c.robot.arrival.distance_mm,
-                     c.robot.arrival.turn_rad) +
+         fmt::format("{} {} {} {:.9f} ", c.scanner_wait.count(), c.disk_wait.count(),
+                     c.robot.arrival.distance_mm, c.robot.arrival.turn_rad) +
          fmt::format("{} {} {} {} {} {} {} {} {} {} {} ", s.driver, s.place.link + s.place.host, s.place.port,
                      static_cast<int>(s.encoding), s.max_stripes, s.max_points_per_stripe, s.field_x_mm,
                      s.field_y_mm, s.noise_mm, s.depth_mm, mount) +
@@ -83,6 +83,7 @@ std::string changed(const std::string& line) {
                                                                          {"missed_ticks", "\"stop\""},
                                                                          {"device_timeout_s", "2.5"},
                                                                          {"scanner_wait_s", "60"},
+                                                                         {"disk_wait_s", "61"},
                                                                          {"arrival_mm", "1"},
                                                                          {"arrival_deg", "0.5"},
                                                                          {"host", "\"10.0.0.7\""},
@@ -163,7 +164,7 @@ TEST_CASE("every key of the example is read: another value makes another configu
     other.erase(other.begin() + static_cast<std::ptrdiff_t>(i));
     CHECK(values(parsed(joined(other))) == before);
   }
-  CHECK(keys == 50);
+  CHECK(keys == 51);
   CHECK(fixed == 3);
 }
 

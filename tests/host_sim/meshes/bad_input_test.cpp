@@ -66,13 +66,13 @@ TEST_CASE("a configuration that is wrong is refused with file and line, and no r
     CHECK_FALSE(fs::exists(out));
   };
   refuses("baud", "bauds = 9600",
-          ":35: [robot] bauds: unknown key; known here: arrival_deg, arrival_mm, baud, device, driver, host, "
+          ":36: [robot] bauds: unknown key; known here: arrival_deg, arrival_mm, baud, device, driver, host, "
           "link, port, "
           "repeatability_z_mm, speed_percent, workspace");
-  refuses("baud", "baud = \"9600\"", ":35: [robot] baud: a whole number is wanted");
-  refuses("baud", "baud = 12", ":35: [robot] baud: 12 is outside 1200 to 921600");
+  refuses("baud", "baud = \"9600\"", ":36: [robot] baud: a whole number is wanted");
+  refuses("baud", "baud = 12", ":36: [robot] baud: 12 is outside 1200 to 921600");
   refuses("x_mm", "x_mm = [800, -800]",
-          ":42: [robot.workspace] x_mm: from 800 to -800 is no range: the smaller number comes first");
+          ":43: [robot.workspace] x_mm: from 800 to -800 is no range: the smaller number comes first");
 }
 
 TEST_CASE("a configuration that is not there is refused by its path") {

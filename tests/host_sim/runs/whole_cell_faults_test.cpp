@@ -2,12 +2,10 @@
 // that breaks something. The invariants are ScriptedRun's.
 #include "firmware_like/commands/fit_command.hpp"
 #include "firmware_like/process/complaint.hpp"
+#include "hal/small_disk.hpp"
 #include "host_sim/scripted_run.hpp"
 
 #include <doctest/doctest.h>
-
-#include <csignal>
-#include <sys/resource.h>
 
 using namespace moldloft;
 using namespace moldloft::host_sim;
@@ -61,23 +59,6 @@ std::string message(const SimulatedRun& run) { return run.summary["message"]; }
 bool says(const SimulatedRun& run, std::string_view text) {
   return message(run).find(text) != std::string::npos;
 }
-
-// No file of this process takes a byte: what a full disk does to a store, without a disk of its own.
-class FullDisk {
- public:
-  FullDisk() {
-    std::signal(SIGXFSZ, SIG_IGN);
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit full{0, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &full);
-  }
-  ~FullDisk() { ::setrlimit(RLIMIT_FSIZE, &before_); }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  rlimit before_{};
-};
 
 }  // namespace
 
@@ -241,11 +222,11 @@ TEST_CASE("a stop in mid-motion stops the arm, and nothing moves it again") {
 
 TEST_CASE("disk full: the cell holds before the next shot, goes on when there is room, and no shot is lost") {
   ScriptedRun cell;
-  std::optional<FullDisk> disk;
+  std::optional<hal::SmallDisk> disk;
   Once full;
   bool held = false;
   const auto run = cell.run([&](const SimulatedCell& c, hal::Instant now) {
-    if (full.begins(surface_shots(c) == 2, now)) disk.emplace();
+    if (full.begins(surface_shots(c) == 2, now)) disk.emplace(0);
     if (full.is_over(20s, now)) disk.reset();
     if (held || c.controller.cell().state() != CellState::held) return;
     held = true;
@@ -256,6 +237,83 @@ TEST_CASE("disk full: the cell holds before the next shot, goes on when there is
   CHECK(run.exit_code == firmware_like::exit_done);
   check_truth(run.summary);
   CHECK(run.summary["shots"]["retaken"] == 0);
+}
+
+TEST_CASE("a disk that hangs and nobody there: the run waits, says so, ends held and can be gone on with") {
+  ScriptedRun cell;
+  cell.set("name", "name = \"hangs\"\ndisk_wait_s = 10");
+  Once hanging, held;
+  bool takes = true;
+  hal::Instant since{0}, ended{0};
+  std::string while_waiting;
+  cell.options.disk_takes = [&] { return takes; };
+  const auto run = cell.run([&](const SimulatedCell& c, hal::Instant now) {
+    const auto& controlled = c.controller.cell();
+    if (hanging.begins(surface_shots(c) == 2, now)) takes = false;
+    if (held.begins(controlled.state() == CellState::held, now)) {
+      since = now;
+      while_waiting = controlled.why().view();
+    }
+    ended = now;
+  });
+  CHECK(run.exit_code == firmware_like::exit_held);
+  CHECK(while_waiting.ends_with("; waiting 10 s for room (ctrl-C ends the run)"));
+  CHECK(message(run) == "nothing could be stored for 10 s: the disk hangs");
+  CHECK(ended - since > 9s);
+  CHECK(ended - since < 11s);
+
+  takes = true;
+  cell.options.resume = true;
+  const auto resumed = cell.run();
+  CHECK(resumed.exit_code == firmware_like::exit_done);
+  check_truth(resumed.summary);
+}
+
+TEST_CASE("where somebody can command the cell a full disk is waited for as long as it takes") {
+  ScriptedRun cell;
+  cell.options.held = true;
+  cell.set("name", "name = \"full\"\ndisk_wait_s = 1");
+  std::optional<hal::SmallDisk> disk;
+  Once full;
+  bool told = false;
+  std::string while_waiting;
+  const auto run = cell.run([&](const SimulatedCell& c, hal::Instant now) {
+    auto& controlled = c.controller.cell();
+    if (!told && controlled.state() == CellState::held)
+      return told = true, controlled.command(tasks::CellEvent::unhold);
+    if (full.begins(surface_shots(c) == 2, now)) disk.emplace(0);
+    if (full.is_over(6min, now)) disk.reset();
+    if (controlled.cause() == HoldCause::recorder) while_waiting = controlled.why().view();
+  });
+  CHECK(while_waiting.ends_with("; waiting until there is room (stop ends the run)"));
+  CHECK(run.exit_code == firmware_like::exit_done);
+  check_truth(run.summary);
+}
+
+TEST_CASE(
+    "a disk that hangs is waited for in silence for 5 s, then the cell holds and says so, and goes on by "
+    "itself") {
+  for (const auto hangs : {4s, 20s}) {
+    CAPTURE(hangs);
+    ScriptedRun cell;
+    Once hanging, held;
+    bool takes = true;
+    hal::Instant last_shot{0};
+    std::string while_waiting;
+    cell.options.disk_takes = [&] { return takes; };
+    const auto run = cell.run([&](const SimulatedCell& c, hal::Instant now) {
+      const auto& controlled = c.controller.cell();
+      if (hanging.begins(surface_shots(c) == 2, now)) takes = false;
+      if (hanging.is_over(hangs, now)) takes = true;
+      if (controlled.state() == CellState::held) while_waiting = controlled.why().view();
+    });
+    CHECK(run.exit_code == firmware_like::exit_done);
+    check_truth(run.summary);
+    CHECK(run.summary["shots"]["retaken"] == 0);
+    CHECK(while_waiting == (hangs == 4s ? ""
+                                        : "the disk does not take what is measured: too slow, or it hangs; "
+                                          "waiting 600 s for room (ctrl-C ends the run)"));
+  }
 }
 
 TEST_CASE("a start pose off the plate is held with the place and what to do") {
