@@ -32,6 +32,17 @@ double smaller_field(const CellConfig& c) { return std::min(c.scanner.field_x_mm
 // No table at all is written as a table far below.
 bool has_table(const CellConfig& c) { return c.plate.table_z_mm > -500; }
 
+// Where a length is too large a part of the field's smaller side.
+MaybeFinding beyond_field(const CellConfig& c, MaybeFinding (*of)(std::vector<std::string>, std::string),
+                          std::string_view section, std::string_view name, double length_mm, double part,
+                          std::string_view what_it_does) {
+  if (length_mm <= part * smaller_field(c)) return {};
+  const std::string share = part == 1 ? "" : part == 0.5 ? "half of " : fmt::format("{} of ", part);
+  return of({fmt::format("{}.{}", section, name), "scanner.field_mm"},
+            fmt::format("[{}] {}: {} is more than {}[scanner] field_mm{}", section, name, length_mm, share,
+                        what_it_does));
+}
+
 // "[scanner] host: ...", of the section's own place.
 struct Placed {
   const char* section;
@@ -204,19 +215,13 @@ MaybeFinding mount_in_radians(const CellConfig& c) {
 }
 
 MaybeFinding scan_overlap(const CellConfig& c) {
-  if (2 * c.scan_overlap_mm <= smaller_field(c)) return {};
-  return error(
-      {"scan.overlap_mm", "scanner.field_mm"},
-      fmt::format("[scan] overlap_mm: {} is more than half of [scanner] field_mm", c.scan_overlap_mm));
+  return beyond_field(c, error, "scan", "overlap_mm", c.scan_overlap_mm, 0.5, "");
 }
 
 // The next field is centred on the boundary's continuation: with more overlap than this the tracker
 // would hardly advance.
 MaybeFinding tracking_overlap(const CellConfig& c) {
-  if (2 * c.tracking_overlap_mm <= 0.9 * smaller_field(c)) return {};
-  return error({"tracking.overlap_mm", "scanner.field_mm"},
-               fmt::format("[tracking] overlap_mm: {} is more than 0.45 of [scanner] field_mm",
-                           c.tracking_overlap_mm));
+  return beyond_field(c, error, "tracking", "overlap_mm", c.tracking_overlap_mm, 0.45, "");
 }
 
 MaybeFinding shots(const CellConfig& c) {
@@ -250,12 +255,8 @@ MaybeFinding step_across_the_plate(const CellConfig& c) {
 }
 
 MaybeFinding seek_step(const CellConfig& c) {
-  if (c.seek_step_mm <= smaller_field(c)) return {};
-  return warning(
-      {"tracking.seek_step_mm", "scanner.field_mm"},
-      fmt::format("[tracking] seek_step_mm: {} is more than [scanner] field_mm; the edge may lie between two "
-                  "looks",
-                  c.seek_step_mm));
+  return beyond_field(c, warning, "tracking", "seek_step_mm", c.seek_step_mm, 1,
+                      "; the edge may lie between two looks");
 }
 
 MaybeFinding seek_limit(const CellConfig& c) {
@@ -268,12 +269,8 @@ MaybeFinding seek_limit(const CellConfig& c) {
 }
 
 MaybeFinding scan_margin(const CellConfig& c) {
-  if (2 * c.scan_margin_mm <= smaller_field(c)) return {};
-  return warning(
-      {"scan.margin_mm", "scanner.field_mm"},
-      fmt::format("[scan] margin_mm: {} is more than half of [scanner] field_mm; whole rows of shots would "
-                  "see no plate",
-                  c.scan_margin_mm));
+  return beyond_field(c, warning, "scan", "margin_mm", c.scan_margin_mm, 0.5,
+                      "; whole rows of shots would see no plate");
 }
 
 MaybeFinding tolerance(const CellConfig& c) {

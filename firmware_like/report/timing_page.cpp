@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <vector>
 
 namespace moldloft::firmware_like {
@@ -28,7 +29,8 @@ h1{font-size:24px;margin:0 0 4px}h2{font-size:17px;margin:34px 0 6px}p{margin:4p
 .tile{display:flex;flex-direction:column;justify-content:space-between;
 background:var(--panel);border:1px solid var(--line);border-radius:6px;padding:8px 12px}
 .tile b{display:block;font-size:21px;font-variant-numeric:tabular-nums;white-space:nowrap}
-.wide{overflow-x:auto}table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums;font-size:14px}
+.wide{overflow-x:auto}.wide+.wide{margin-top:14px}
+table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums;font-size:14px}
 th,td{padding:3px 8px;border-bottom:1px solid var(--line);text-align:right;white-space:nowrap}
 th{color:var(--soft);font-weight:600}th:first-child,td:first-child,.words td,.words th,th.word,td.word{text-align:left}
 .words td{white-space:normal;vertical-align:top}.words td:first-child{white-space:nowrap}
@@ -40,7 +42,8 @@ svg{width:100%;height:auto;display:block}.grid{stroke:var(--line)}.fine{stroke:v
 .slim{display:none}
 @media screen and (max-width:640px){.slim{display:block}.broad{display:none}main{padding:16px 12px 32px}
 table{font-size:12px}th,td{padding:3px 4px}th,td:first-child,td.word,.words td:first-child{white-space:normal}
-.words td{overflow-wrap:anywhere}
+.words td:not(:first-child){overflow-wrap:anywhere}.budgets :is(th,td):nth-child(2){display:none}
+.tasks :is(th,td):is(:nth-child(2),:nth-child(6)){display:none}
 .stats :is(th,td):is(:nth-child(3),:nth-child(7),:nth-child(9),:nth-child(10)){display:none}}
 @page{size:A4;margin:14mm}
 @media print{:root{--paper:#fff;--ink:#000;--soft:#444;--line:#bbb;--fine:#e6e6e6;--ours:#1f6fb2;--theirs:#c2571a;
@@ -210,9 +213,12 @@ std::string distributions(const Json& t) {
   add("frame to command", "frame_to_command");
   add("data age", "data_age");
   std::string lead =
-      "Microseconds. The table runs at the begin of a tick, background work in the slack that it leaves.";
-  if (!measured(t, "frame_to_command"))
-    lead += " From frame to command is measured in runs with devices only.";
+      "Microseconds. The table runs at the beginning of a tick, background work in the slack that it leaves.";
+  if (!measured(t, "frame_to_command")) {
+    const bool has_devices = t.contains("frame_to_command") && t.at("frame_to_command").is_object();
+    lead += has_devices ? " No frame has led to a command in this run."
+                        : " From frame to command is measured in runs with devices only.";
+  }
   return section("Everything that was timed", lead, statistics(histogram_head(""), rows));
 }
 
@@ -241,7 +247,8 @@ std::string tasks_section(const Json& t) {
   return section(
       "Tasks",
       "A slip is a run that fell into a missed tick; a late start began after the budgets of the tasks "
-      "before it; an overrun took longer than its budget. Refused: a tick whose slack was too short. Longest "
+      "before it, lateness counts all of them together; an overrun took longer than its budget. Refused: a "
+      "tick whose slack was too short. Longest "
       "at: when the longest run began, on the clock of the events and of the flight recorder.",
       table({{"task"},
              {"every n ticks"},
@@ -251,7 +258,8 @@ std::string tasks_section(const Json& t) {
              {"lateness, us"},
              {"overruns"},
              {"longest at, s"}},
-            rows) +
+            rows, "tasks") +
+          "<p class=\"slim soft\">In part: a wider window shows period and lateness as well.</p>\n" +
           table(
               {{"background"}, {"steps"}, {"refused"}, {"forced"}, {"beyond the quantum"}, {"longest at, s"}},
               background));
@@ -259,10 +267,10 @@ std::string tasks_section(const Json& t) {
 
 std::string misses(const Json& t) {
   if (t.value("missed_ticks", std::uint64_t{0}) == 0) return section("Missed ticks", "None.", "");
-  std::string lead;
+  std::string lead = fmt::format("{} in all", t.at("missed_ticks").get<std::uint64_t>());
   if (t.contains("missed_by_cause"))
     for (const auto& [cause, count] : t.at("missed_by_cause").items())
-      lead += fmt::format("{}{}: {}", lead.empty() ? "" : ", ", escaped(cause), count.get<std::uint64_t>());
+      lead += fmt::format(", {}: {}", escaped(cause), count.get<std::uint64_t>());
   std::string rows;
   for (const auto& m : t.at("first_misses"))
     rows += row({{moment_s(m, "t_ms")},
@@ -312,7 +320,8 @@ std::string budgets(const Json& t) {
                   escaped(b.at("rule").get<std::string>()), figure(b, "busiest_tick_us"),
                   figure(b, "busiest_tick_suggested_us"), figure(t, "tick_us"), figure(b, "guard_us"),
                   b.value("suggested_fits_the_tick", true) ? "" : ": the suggested budgets do not fit"),
-      table({{"us"}, {"runs"}, {"p99.9"}, {"max"}, {"declared"}, {"suggested"}, {"judged", "word"}}, rows));
+      table({{"us"}, {"runs"}, {"p99.9"}, {"max"}, {"declared"}, {"suggested"}, {"judged", "word"}}, rows,
+            "budgets"));
 }
 
 // What the operating system did to the control thread after its first ticks.
@@ -322,7 +331,7 @@ std::string control_thread(const Json& t) {
   return section(
       "The control thread",
       "Counted by the kernel after the first ticks. A thread that only sleeps to its ticks gives the "
-      "processor away once a tick.",
+      "processor away once a tick. Moved: to another processor.",
       table({{"ticks"}, {"page faults"}, {"gave way"}, {"preempted"}, {"moved"}},
             row({{figure(c, "ticks")},
                  {fmt::format("{}", c.at("minor_faults").get<std::uint64_t>() +
@@ -342,14 +351,20 @@ std::string machine(const Json& t) {
     }
     for (const auto& [inner, text] : value.items()) rows += row({{escaped(inner)}, {figure(text)}});
   }
+  const auto has_hint = [](const Json& s) { return !s.at("hint").get<std::string>().empty(); };
+  const bool all_got = std::ranges::none_of(t.at("setup"), has_hint);
   std::string setup;
-  for (const auto& s : t.at("setup"))
-    setup += row({{figure(s, "what")},
-                  {figure(s, "wanted")},
-                  {figure(s, "got"), s.at("ok").get<bool>() ? "good" : "bad"},
-                  {s.at("hint").get<std::string>().empty() ? "" : figure(s, "hint")}});
+  for (const auto& s : t.at("setup")) {
+    std::vector<Cell> cells = {{figure(s, "what")},
+                               {figure(s, "wanted")},
+                               {figure(s, "got"), s.at("ok").get<bool>() ? "good" : "bad"}};
+    if (!all_got) cells.push_back({has_hint(s) ? figure(s, "hint") : ""});
+    setup += row(cells);
+  }
+  std::vector<Cell> heads = {{"what"}, {"wanted"}, {"got"}};
+  if (!all_got) heads.push_back({"how to get it"});
   return section("Process set-up", "Asked of the operating system, and what it gave when read back.",
-                 table({{"what"}, {"wanted"}, {"got"}, {"how to get it"}}, setup, "words")) +
+                 table(heads, setup, "words")) +
          section("The machine", "As the kernel describes it.", table({{""}, {""}}, rows, "words"));
 }
 

@@ -74,15 +74,18 @@ std::expected<Claim, std::string> claim_address(const std::string& host, std::ui
   return Claim::take(fmt::format("scanner/{}/{}", where, port), fmt::format("scanner {}:{}", host, port));
 }
 
+bool is_pseudo_terminal(dev_t device) noexcept {
+  constexpr unsigned first = 136, last = 143;  // major numbers of Linux
+  return major(device) >= first && major(device) <= last;
+}
+
 std::expected<Claim, std::string> claim_serial(const std::string& device) {
   struct stat port {};
   if (::stat(device.c_str(), &port) != 0 || !S_ISCHR(port.st_mode)) return Claim{};
   // A pseudo-terminal's number is given to another one as soon as it is gone, while whoever had it may still live:
   // there the moment of its making tells them apart. It is not asked of a real port, whose owner may change.
-  constexpr unsigned first_pseudo_terminal = 136, last_pseudo_terminal = 143;  // major numbers of Linux
-  const unsigned kind = major(port.st_rdev);
-  std::string name = fmt::format("serial/{}:{}", kind, minor(port.st_rdev));
-  if (kind >= first_pseudo_terminal && kind <= last_pseudo_terminal)
+  std::string name = fmt::format("serial/{}:{}", major(port.st_rdev), minor(port.st_rdev));
+  if (is_pseudo_terminal(port.st_rdev))
     name += fmt::format(":{}.{:09}", port.st_ctim.tv_sec, port.st_ctim.tv_nsec);
   return Claim::take(name, "robot's port " + device);
 }

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <expected>
 #include <string>
+#include <sys/types.h>
 #include <utility>
 
 namespace moldloft::hal {
@@ -37,6 +38,9 @@ std::expected<Claim, std::string> claim_address(const std::string& host, std::ui
 // The port behind a device's name, whatever links lead there; nothing is claimed where there is no device yet.
 std::expected<Claim, std::string> claim_serial(const std::string& device);
 std::expected<Claim, std::string> claim_folder(const std::string& path);
+
+// Whether a device's number (st_rdev) is that of a pseudo-terminal's near end.
+bool is_pseudo_terminal(dev_t device) noexcept;
 
 // The process that holds a flock() on this open file, as far as the kernel tells; 0: unknown.
 int process_with_lock(int file) noexcept;

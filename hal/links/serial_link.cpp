@@ -14,7 +14,6 @@
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
-#include <sys/sysmacros.h>
 #include <system_error>
 #include <unistd.h>
 #include <utility>
@@ -113,10 +112,7 @@ class SerialLink final : public ByteLink {
       return false;
     }
     struct stat port {};
-    constexpr unsigned first_pseudo_terminal = 136, last_pseudo_terminal = 143;  // major numbers of Linux
-    const bool known = ::fstat(handle_, &port) == 0;
-    const unsigned kind = known ? major(port.st_rdev) : first_pseudo_terminal;
-    if (kind < first_pseudo_terminal || kind > last_pseudo_terminal) ::ioctl(handle_, TIOCEXCL);
+    if (::fstat(handle_, &port) == 0 && !is_pseudo_terminal(port.st_rdev)) ::ioctl(handle_, TIOCEXCL);
     return true;
   }
 

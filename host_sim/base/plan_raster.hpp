@@ -1,15 +1,17 @@
 // Square cells over a part of the plan, and which of them something covers.
 //
 // Cost         for_rows: linear in the rows touched, so that long oblique shapes cost no more than they cover
-// Allocation   none
+// Allocation   in listed_by_cell() only
 #pragma once
 
 #include <Eigen/Core>
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <span>
+#include <vector>
 
 namespace moldloft::host_sim {
 
@@ -61,5 +63,21 @@ struct PlanRaster {
     }
   }
 };
+
+// What each cell covers, in one list with a cell's items side by side: cell.first and cell.count say which are its own.
+// for_cells(visit) calls visit(cell, item) for all pairs; it is called twice, to count and to list.
+template <typename Item, typename Cells, typename ForCells>
+std::vector<Item> listed_by_cell(Cells& cells, ForCells&& for_cells) {
+  for_cells([](auto& cell, const Item&) { ++cell.count; });
+  std::uint32_t first = 0;
+  for (auto& cell : cells) {
+    cell.first = first;
+    first += cell.count;
+    cell.count = 0;
+  }
+  std::vector<Item> listed(first);
+  for_cells([&](auto& cell, const Item& item) { listed[cell.first + cell.count++] = item; });
+  return listed;
+}
 
 }  // namespace moldloft::host_sim

@@ -115,15 +115,7 @@ class MeshPlate final : public Plate {
         });
       }
     };
-    for_cells([](Cell& cell, std::uint32_t) { ++cell.count; });
-    std::uint32_t first = 0;
-    for (auto& cell : cells_) {
-      cell.first = first;
-      first += cell.count;
-      cell.count = 0;
-    }
-    listed_.resize(first);
-    for_cells([&](Cell& cell, std::uint32_t facet) { listed_[cell.first + cell.count++] = facet; });
+    listed_ = listed_by_cell<std::uint32_t>(cells_, for_cells);
     fill_empty_cells();
   }
 

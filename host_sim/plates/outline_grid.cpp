@@ -42,19 +42,12 @@ void OutlineGrid::list_sides(PlanPoints outline) {
     for (std::size_t i = 0, j = outline.size() - 1; i < outline.size(); j = i++) {
       const Eigen::Vector2d side[] = {outline[j], outline[i]};
       raster_.for_rows(side, 1e-6 * raster_.cell_mm, [&](int row, int first, int last) {
-        for (int column = first; column <= last; ++column) visit(cells_[raster_.index(column, row)], side);
+        for (int column = first; column <= last; ++column)
+          visit(cells_[raster_.index(column, row)], Side{outline[j], outline[i]});
       });
     }
   };
-  for_cells([](Cell& cell, const auto&) { ++cell.count; });
-  std::uint32_t first = 0;
-  for (auto& cell : cells_) {
-    cell.first = first;
-    first += cell.count;
-    cell.count = 0;
-  }
-  listed_.resize(first);
-  for_cells([&](Cell& cell, const auto& side) { listed_[cell.first + cell.count++] = {side[0], side[1]}; });
+  listed_ = listed_by_cell<Side>(cells_, for_cells);
 }
 
 void OutlineGrid::find_middles(PlanPoints outline) {

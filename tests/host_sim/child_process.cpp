@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <fcntl.h>
-#include <fstream>
 #include <signal.h>
-#include <sstream>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -67,12 +65,6 @@ Finished run_program(const std::vector<std::string>& words, hal::Duration limit)
   ChildProcess child{words};
   const auto code = child.wait(limit);
   return {code, child.out(), child.err()};
-}
-
-std::string text_of(const std::string& path) {
-  std::ostringstream text;
-  text << std::ifstream{path}.rdbuf();
-  return text.str();
 }
 
 int lines_in(std::string_view text) { return static_cast<int>(std::count(text.begin(), text.end(), '\n')); }

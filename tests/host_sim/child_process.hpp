@@ -3,6 +3,7 @@
 #pragma once
 
 #include "hal/base/clock.hpp"
+#include "hal/file_text.hpp"
 #include "hal/temporary_folder.hpp"
 
 #include <optional>
@@ -45,7 +46,7 @@ class ChildProcess {
 // Runs a program to its end.
 Finished run_program(const std::vector<std::string>& words, hal::Duration limit = std::chrono::seconds{30});
 
-std::string text_of(const std::string& path);
+using hal::text_of;
 int lines_in(std::string_view text);
 
 }  // namespace moldloft::host_sim

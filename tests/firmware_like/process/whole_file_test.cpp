@@ -1,27 +1,22 @@
 #include "firmware_like/process/whole_file.hpp"
 
+#include "hal/file_text.hpp"
+#include "hal/small_disk.hpp"
 #include "hal/temporary_folder.hpp"
 
 #include <doctest/doctest.h>
 
 #include <fcntl.h>
-#include <fstream>
-#include <sstream>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 #include <unistd.h>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;
+using hal::text_of;
 namespace fs = std::filesystem;
 
 namespace {
-
-std::string text_of(const fs::path& path) {
-  std::ostringstream text;
-  text << std::ifstream{path}.rdbuf();
-  return text.str();
-}
 
 std::string refused(const std::expected<void, Failure>& written) {
   return written ? "" : written.error().what;
@@ -33,7 +28,42 @@ mode_t mode_of(const fs::path& path) {
   return what.st_mode;
 }
 
+std::size_t files_in(const fs::path& folder) {
+  return static_cast<std::size_t>(std::distance(fs::directory_iterator{folder}, fs::directory_iterator{}));
+}
+
 }  // namespace
+
+TEST_CASE("a file is written whole, byte for byte, and replaces the one before") {
+  const hal::TemporaryFolder folder;
+  const fs::path path = folder.file("summary.json");
+  const std::string bytes{"a\0b\r\n\xff", 6};
+  REQUIRE(write_file(path, "first, and longer than what follows").has_value());
+  REQUIRE(write_file(path, bytes).has_value());
+  CHECK(text_of(path) == bytes);
+  CHECK(files_in(folder.path()) == 1);  // nothing is left beside it
+}
+
+TEST_CASE("a disk that is full leaves the file of before as it was") {
+  const hal::TemporaryFolder folder;
+  const fs::path path = folder.file("summary.json");
+  REQUIRE(write_file(path, "before").has_value());
+  const auto written = [&] {
+    const hal::SmallDisk disk{1000};
+    return write_file(path, std::string(100'000, 'x'));
+  }();
+  CHECK(refused(written) ==
+        path.string() + ": cannot be written: larger than this user's files may be (ulimit -f)");
+  CHECK(text_of(path) == "before");
+  CHECK(files_in(folder.path()) == 1);  // nor does half a file stay beside it
+}
+
+TEST_CASE("a folder that is not there is told by the file's path") {
+  const hal::TemporaryFolder folder;
+  CHECK(refused(write_file(folder.file("none/summary.json"), "x")) ==
+        folder.file("none/summary.json") + ": cannot be written: there is no folder " + folder.file("none") +
+            "; make it first");
+}
 
 TEST_CASE("a file keeps its mode when it is replaced, and a new one has the user's") {
   const hal::TemporaryFolder folder;

@@ -4,6 +4,7 @@
 
 #include "firmware_like/forked.hpp"
 #include "firmware_like/realtime/control_thread.hpp"
+#include "hal/file_text.hpp"
 #include "hal/temporary_folder.hpp"
 
 #include <fmt/format.h>
@@ -23,6 +24,7 @@
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;
+using hal::text_of;
 using nlohmann::json;
 using test::in_child;
 
@@ -44,12 +46,6 @@ json as_json(const SetupRows& rows) {
                                              {"hint", row.hint}};
   }
   return all;
-}
-
-std::string text_of(const std::string& path) {
-  std::ostringstream text;
-  text << std::ifstream{path}.rdbuf();
-  return text.str();
 }
 
 std::string status_of(const std::string& key) {

@@ -157,7 +157,7 @@ TEST_CASE("the page shows ours and cyclictest in one drawing, every task, miss a
     CAPTURE(heading);
     CHECK(count_of(page, "<h2>" + std::string{heading} + "</h2>") == 1);
   }
-  CHECK(page.find("computing: 3") != page.npos);  // ticks 701 to 703
+  CHECK(page.find("3 in all, woken late: 0, preempted: 0, computing: 3. ") != page.npos);  // ticks 701 to 703
   CHECK(page.find(std::string{budget_rule}) != page.npos);
 }
 
@@ -196,6 +196,9 @@ surface | 410 | 80.0 | 80.0 | 100 | - | too few runs
         R"(what | wanted | got | how to get it
 memory lock | all pages | !&lt;none&gt; | raise memlock
 )");
+  t["setup"][0]["hint"] = "";  // nothing is missing: no column for it
+  CHECK(rows_below(timing_page(t, "run"), "Process set-up") ==
+        "what | wanted | got\nmemory lock | all pages | !&lt;none&gt;\n");
   t["budgets"]["tasks"][0]["judged"] = "too small";
   CHECK(rows_below(timing_page(t, "run"), "Budgets").find("| 190 | !too small\n") != std::string::npos);
 }
@@ -209,6 +212,16 @@ TEST_CASE("a run in virtual time has a page without machine and comparison") {
   CHECK(count_of(page, "<path class=\"s1\"") == 0);
 }
 
+TEST_CASE(
+    "a run on devices that ended before any frame led to a command is not taken for one without devices") {
+  Json t = report();
+  const auto said = [&] { return timing_page(t, "run"); };
+  CHECK(said().find("in runs with devices only") != std::string::npos);
+  t["frame_to_command"] = {{"count", 0}};
+  CHECK(said().find("in runs with devices only") == std::string::npos);
+  CHECK(said().find("No frame has led to a command in this run.") != std::string::npos);
+}
+
 TEST_CASE("the page fits a telephone of 400 px and a sheet of A4, and no digit is cut off") {
   const std::string page = timing_page(report(), "run");
   // Narrow: drawings of their own, 376 px wide so that 12 px letters are 12 px; tables keep their most telling columns.
@@ -217,6 +230,8 @@ TEST_CASE("the page fits a telephone of 400 px and a sheet of A4, and no digit i
   CHECK(page.find("@media screen and (max-width:640px){.slim{display:block}.broad{display:none}") !=
         page.npos);
   CHECK(count_of(page, "<table class=\"stats\">") == 2);
+  CHECK(count_of(page, "<table class=\"tasks\">") == 1);
+  CHECK(count_of(page, "<table class=\"budgets\">") == 1);
   // Paper: the sheet is named, nothing scrolls, heads of columns are broken rather than cut.
   CHECK(page.find("@page{size:A4;margin:14mm}") != page.npos);
   const std::string print = page.substr(page.find("@media print"));

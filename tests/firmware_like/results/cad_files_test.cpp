@@ -4,17 +4,18 @@
 #include "firmware_like/process/complaint.hpp"
 #include "firmware_like/results/summary.hpp"
 #include "firmware_like/run/surface_file.hpp"
+#include "hal/file_text.hpp"
 #include "hal/temporary_folder.hpp"
 
 #include <doctest/doctest.h>
 
 #include <fstream>
 #include <limits>
-#include <sstream>
 #include <unistd.h>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;
+using hal::text_of;
 namespace fs = std::filesystem;
 
 namespace {
@@ -37,12 +38,6 @@ geometry::BSplineSurface small_surface() {
 const Json summary = {{"plate", "saddle"},
                       {"begun", "2026-11-25T07:08:09Z"},
                       {"surface", {{"sigma_mm", 0.0509}, {"tolerance_mm", 0.005}}}};
-
-std::string text_of(const fs::path& path) {
-  std::ostringstream text;
-  text << std::ifstream{path, std::ios::binary}.rdbuf();
-  return text.str();
-}
 
 // A run's folder as far as its surface goes.
 void leave_results(const fs::path& folder, const geometry::BSplineSurface& surface) {

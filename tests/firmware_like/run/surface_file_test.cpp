@@ -1,69 +1,9 @@
 #include "firmware_like/run/surface_file.hpp"
 
-#include "firmware_like/process/whole_file.hpp"
-#include "hal/temporary_folder.hpp"
-
 #include <doctest/doctest.h>
-
-#include <csignal>
-#include <fstream>
-#include <sstream>
-#include <sys/resource.h>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;
-namespace fs = std::filesystem;
-
-namespace {
-
-std::string text_of(const fs::path& path) {
-  std::ostringstream text;
-  text << std::ifstream{path, std::ios::binary}.rdbuf();
-  return text.str();
-}
-
-std::size_t files_in(const fs::path& folder) {
-  return static_cast<std::size_t>(std::distance(fs::directory_iterator{folder}, fs::directory_iterator{}));
-}
-
-}  // namespace
-
-TEST_CASE("a file is written whole, byte for byte, and replaces the one before") {
-  const hal::TemporaryFolder folder;
-  const fs::path path = folder.file("summary.json");
-  const std::string bytes{"a\0b\r\n\xff", 6};
-  REQUIRE(write_file(path, "first, and longer than what follows").has_value());
-  REQUIRE(write_file(path, bytes).has_value());
-  CHECK(text_of(path) == bytes);
-  CHECK(files_in(folder.path()) == 1);  // nothing is left beside it
-}
-
-TEST_CASE("a disk that is full leaves the file of before as it was") {
-  const hal::TemporaryFolder folder;
-  const fs::path path = folder.file("summary.json");
-  REQUIRE(write_file(path, "before").has_value());
-  std::signal(SIGXFSZ, SIG_IGN);
-  rlimit limit{};
-  ::getrlimit(RLIMIT_FSIZE, &limit);
-  const rlimit full{1000, limit.rlim_max};
-  ::setrlimit(RLIMIT_FSIZE, &full);
-  const auto refused = write_file(path, std::string(100'000, 'x'));
-  ::setrlimit(RLIMIT_FSIZE, &limit);
-  REQUIRE_FALSE(refused.has_value());
-  CHECK(refused.error().what ==
-        path.string() + ": cannot be written: larger than this user's files may be (ulimit -f)");
-  CHECK(text_of(path) == "before");
-  CHECK(files_in(folder.path()) == 1);  // nor does half a file stay beside it
-}
-
-TEST_CASE("a folder that is not there is told by the file's path") {
-  const hal::TemporaryFolder folder;
-  const auto refused = write_file(folder.file("none/summary.json"), "x");
-  REQUIRE_FALSE(refused.has_value());
-  CHECK(refused.error().what == folder.file("none/summary.json") +
-                                    ": cannot be written: there is no folder " + folder.file("none") +
-                                    "; make it first");
-}
 
 TEST_CASE("a surface as JSON: unit, frame, degree, knots, and the net row by row along u") {
   geometry::BSplineSurface s;

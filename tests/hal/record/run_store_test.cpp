@@ -2,15 +2,14 @@
 
 #include "hal/sample_frame.hpp"
 #include "hal/scanner/psc1.hpp"
+#include "hal/small_disk.hpp"
 #include "hal/temporary_folder.hpp"
 
 #include <doctest/doctest.h>
 #include <sqlite3.h>
 
-#include <csignal>
 #include <cstring>
 #include <fstream>
-#include <sys/resource.h>
 
 using namespace moldloft::hal;
 using Mode = RunStore::Mode;
@@ -229,19 +228,15 @@ TEST_CASE("a disk that is full is said so, nothing half is kept, and it goes on 
   const TemporaryFolder folder;
   const std::string path = folder.file("run.db");
   RunStore store = opened(path, Mode::create);
-  // A limit on the size of a file stands in for the end of the disk; SQLite sees the write fail.
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  const auto ignored = std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit small{.rlim_cur = 300'000, .rlim_max = before.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &small);
   const auto bulk = counting(1'000'000);
   REQUIRE(store.begin());
-  auto done = store.write({.size = 1'000'000}, bulk);
-  if (done) done = store.commit();
-  store.roll_back();
-  setrlimit(RLIMIT_FSIZE, &before);
-  std::signal(SIGXFSZ, ignored);
+  const auto done = [&] {
+    const SmallDisk disk{300'000};
+    auto written = store.write({.size = 1'000'000}, bulk);
+    if (written) written = store.commit();
+    store.roll_back();
+    return written;
+  }();
   REQUIRE_FALSE(done);
   CHECK(done.error().what.starts_with(path + ": the disk"));
   REQUIRE(store.begin());
