@@ -5,6 +5,7 @@
 #include "tasks/machines/boundary_tracker.hpp"
 #include "tasks/machines/cell_state.hpp"
 #include "tasks/machines/shot_sequence.hpp"
+#include "tasks/machines/start_sequence.hpp"
 
 #include <fmt/format.h>
 
@@ -148,9 +149,11 @@ std::string driver_diagrams() {
 
 std::string cell_diagrams() {
   const auto cell = machine_of<tasks::CellState>(tasks::cell_transitions(), tasks::cell_state_count);
+  const auto start = machine_of<tasks::StartState>(tasks::start_transitions(), tasks::start_state_count);
   const auto shots = machine_of<tasks::ShotState>(tasks::shot_transitions(), tasks::shot_state_count);
   const auto tracker = machine_of<tasks::TrackState>(tasks::track_transitions(), tasks::track_state_count);
   return fmt::format("### Supervisor (`machines/cell_state.cpp`)\n\n{}\n", diagram(cell)) +
+         fmt::format("### Start of the devices (`machines/start_sequence.cpp`)\n\n{}\n", diagram(start)) +
          fmt::format("### Shot sequence (`machines/shot_sequence.cpp`)\n\n{}\n", diagram(shots)) +
          fmt::format("### Boundary tracker (`machines/track_table.cpp`)\n\n{}", diagram(tracker));
 }

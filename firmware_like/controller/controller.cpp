@@ -38,7 +38,7 @@ Controller::Controller(const CellConfig& config, hal::Clock& clock, hal::ByteLin
       scanner_{make_scanner(config.scanner, scanner_link_)},
       robot_{make_robot(config.robot, robot_link_, options.nonce)},
       surface_{surface_settings(config)},
-      cell_{settings_for(config, options), clock, *scanner_, *robot_, recorder_, surface_, options.archive},
+      cell_{settings_for(config, options), *scanner_, *robot_, recorder_, surface_, options.archive},
       receive_scanner_{Row{this, &Controller::receive_scanner}},
       receive_robot_{Row{this, &Controller::receive_robot}},
       transmit_robot_{Row{this, &Controller::transmit_robot}},

@@ -207,7 +207,7 @@ void LatencyLoad::measure(hal::Instant) {
 
 void LatencyLoad::walk_the_edge() {
   if (looked_at_ != nullptr && view_.found()) {
-    surface_.keep(view_, looked_at_->world_from_scanner);
+    surface_.keep(view_, looked_at_->world_from_scanner, {});  // no lease: these frames stay
     looked_at_ = nullptr;
     return;
   }
@@ -216,7 +216,7 @@ void LatencyLoad::walk_the_edge() {
 
 void LatencyLoad::sweep() {
   if (looked_at_ != nullptr && view_.found()) {
-    surface_.fold(view_, looked_at_->world_from_scanner);
+    surface_.fold(view_, looked_at_->world_from_scanner, {});
     points_ += looked_at_->frame.point_count;
     looked_at_ = nullptr;
     return;

@@ -3,6 +3,8 @@
 #include "hal/base/reserved.hpp"
 
 #include <algorithm>
+#include <cassert>
+#include <utility>
 
 namespace moldloft::tasks {
 
@@ -20,16 +22,19 @@ void SurfaceTask::begin() {
   looking_at_ = nullptr;
   keeping_from_ = nullptr;
   planning_ = nullptr;
+  kept_.end();
+  folded_.end();
   reserve_.clear();
   reserve_ends_.clear();
   reserve_next_ = reserve_shot_ = 0;
   shots_ = 0;
 }
 
-void SurfaceTask::keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner) {
+void SurfaceTask::keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner, FrameLease lease) {
   if (reserve_ends_.size() == reserve_ends_.capacity()) return;  // the tracker gives up before this
   shot.rewind(settings_.reserve_stride);
   keeping_from_ = &shot;
+  kept_ = std::move(lease);
   world_from_scanner_ = world_from_scanner;
   keep_end_ = std::min(reserve_.size() + settings_.reserve_points_per_shot, reserve_.capacity());
 }
@@ -47,6 +52,7 @@ void SurfaceTask::step_keep() {
   if (left == 0 && reserve_.size() < keep_end_) return;
   hal::add_within_reserve(reserve_ends_, reserve_.size());
   keeping_from_ = nullptr;
+  kept_.end();
 }
 
 void SurfaceTask::build_outline(std::span<const Eigen::Vector2d> edges,
@@ -57,9 +63,12 @@ void SurfaceTask::build_outline(std::span<const Eigen::Vector2d> edges,
   stage_ = Stage::choosing_corners;
 }
 
-void SurfaceTask::fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner) {
+void SurfaceTask::fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner, FrameLease lease) {
+  assert(stage_ == Stage::open || stage_ == Stage::failed);
+  if (stage_ != Stage::open) return;
   shot.rewind(1);
   shot_ = &shot;
+  folded_ = std::move(lease);
   world_from_scanner_ = world_from_scanner;
   stage_ = Stage::folding;
 }
@@ -106,6 +115,7 @@ void SurfaceTask::step(Instant) {
 
 void SurfaceTask::fail(geometry::Error error) {
   error_ = error;
+  folded_.end();
   stage_ = Stage::failed;
 }
 
@@ -156,6 +166,7 @@ void SurfaceTask::step_fold() {
   const std::size_t count = shot_->next(chunk_);
   if (count == 0) {
     ++shots_;
+    folded_.end();
     stage_ = Stage::open;
     return;
   }

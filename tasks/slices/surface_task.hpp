@@ -19,6 +19,7 @@
 #include "hal/base/realtime.hpp"
 #include "tasks/planning/scan_plan.hpp"
 #include "tasks/scheduler/scheduler.hpp"
+#include "tasks/slices/frame_lease.hpp"
 #include "tasks/slices/shot_view.hpp"
 
 #include <Eigen/Core>
@@ -63,9 +64,9 @@ class SurfaceTask final : public BackgroundTask {
   void look(ShotView& shot) { looking_at_ = &shot; }
   void stop_looking() { looking_at_ = nullptr; }
   bool looking() const { return looking_at_ != nullptr; }
-  // Keeps a thinned copy of the plate's points of a boundary shot; `shot` and its frame stay untouched by others as
-  // long as keeping() says true. Goes before the work on the outline.
-  void keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner) MOLDLOFT_NONBLOCKING;
+  // Keeps a thinned copy of the plate's points of a boundary shot; `shot` and its frame stay untouched by others until
+  // the lease ends. Goes before the work on the outline.
+  void keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner, FrameLease) MOLDLOFT_NONBLOCKING;
   bool keeping() const MOLDLOFT_NONBLOCKING { return keeping_from_ != nullptr; }
   // `corner_candidates`: what the tracker took for corners; more than four is no harm.
   void build_outline(std::span<const Eigen::Vector2d> edges,
@@ -73,8 +74,9 @@ class SurfaceTask final : public BackgroundTask {
   // Plans which shots cover the outline, which is ready; planning() turns false when it is done. Goes before the fit.
   void plan(ZigzagPlan& zigzag) { planning_ = &zigzag; }
   bool planning() const { return planning_ != nullptr; }
-  // Folds a surface shot in; `shot` and its frame stay untouched by others until stage() is open again.
-  void fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner) MOLDLOFT_NONBLOCKING;
+  // Folds a surface shot in; `shot` and its frame stay untouched by others until the lease ends. The stage is open, or
+  // failed: then the shot is dropped.
+  void fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner, FrameLease) MOLDLOFT_NONBLOCKING;
   void solve() MOLDLOFT_NONBLOCKING;
 
   bool has_work() const override;
@@ -82,6 +84,8 @@ class SurfaceTask final : public BackgroundTask {
   std::size_t next_kind() const override { return can_look() ? looking_at_->next_kind() : 0; }
 
   Stage stage() const { return stage_; }
+  // The outline is there, the surface does not take a shot yet: what is exposed now might come too early.
+  bool prepares() const { return stage_ == Stage::clearing || stage_ == Stage::folding_reserve; }
   bool outline_ready() const { return stage_ >= Stage::clearing && stage_ != Stage::failed; }
   geometry::Error error() const { return error_; }
   const geometry::Outline& outline() const { return outline_.outline(); }
@@ -124,6 +128,7 @@ class SurfaceTask final : public BackgroundTask {
   ShotView* looking_at_ = nullptr;
   ShotView* keeping_from_ = nullptr;
   ZigzagPlan* planning_ = nullptr;
+  FrameLease kept_, folded_;  // of the frames of keeping_from_ and shot_
   std::size_t keep_end_ = 0;  // of the reserve, for the shot at hand
   int map_row_ = -1;          // of the plan map's check; -1: the outline is not there yet
   geometry::RigidMotion world_from_scanner_;

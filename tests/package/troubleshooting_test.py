@@ -8,8 +8,8 @@ import sys
 
 tree = pathlib.Path(sys.argv[1])
 # Where a hold, an abort or a lost device gets its words.
-speakers = ["tasks/machines/boundary_tracker.cpp", "tasks/cell/cell.cpp", "tasks/cell/cell_phases.cpp", "tasks/cell/cell_shots.cpp",
-            "tasks/cell/motion_guard.cpp", "tasks/slices/surface_task.cpp", "firmware_like/controller/controller.cpp", "hal/robot/line_robot.cpp",
+speakers = ["tasks/machines/boundary_tracker.cpp", "tasks/cell/cell.cpp", "tasks/cell/device_words.cpp", "tasks/cell/disk_wait.cpp", "tasks/cell/measurement.cpp",
+            "tasks/cell/shot_taker.cpp", "tasks/cell/supervisor.cpp", "tasks/cell/motion_guard.cpp", "tasks/slices/surface_task.cpp", "firmware_like/controller/controller.cpp", "hal/robot/line_robot.cpp",
             "hal/scanner/psc_scanner.cpp", "hal/record/recorder.cpp", "hal/links/serial_link.cpp", "hal/links/tcp_link.cpp"]
 
 

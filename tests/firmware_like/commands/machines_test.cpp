@@ -6,6 +6,7 @@
 #include "tasks/machines/boundary_tracker.hpp"
 #include "tasks/machines/cell_state.hpp"
 #include "tasks/machines/shot_sequence.hpp"
+#include "tasks/machines/start_sequence.hpp"
 
 #include <doctest/doctest.h>
 
@@ -59,9 +60,10 @@ void check_every_row_has_its_arrow(const std::string& diagram, Table table) {
 
 }  // namespace
 
-TEST_CASE("every row of the tracker and of the shot sequence is an arrow with its event and action") {
+TEST_CASE("every row of the tracker, the start and the shot sequence is an arrow with its event and action") {
   const std::string text = firmware_like::cell_diagrams();
   check_every_row_has_its_arrow(section(text, "track_table.cpp"), tasks::track_transitions());
+  check_every_row_has_its_arrow(section(text, "start_sequence.cpp"), tasks::start_transitions());
   check_every_row_has_its_arrow(section(text, "shot_sequence.cpp"), tasks::shot_transitions());
 }
 

@@ -4,6 +4,7 @@
 #include "tasks/machines/boundary_tracker.hpp"
 #include "tasks/machines/cell_state.hpp"
 #include "tasks/machines/shot_sequence.hpp"
+#include "tasks/machines/start_sequence.hpp"
 
 #include <doctest/doctest.h>
 
@@ -20,6 +21,12 @@ TEST_CASE("the supervisor's table answers every event in every state") {
 TEST_CASE("the shot sequence's table answers every event in every state") {
   check_complete(shot_transitions(), shot_ignored(), shot_state_count, shot_event_count);
   check_reachable(shot_transitions(), shot_state_count);
+}
+
+TEST_CASE("the start sequence's table answers every event in every state, whatever the devices say") {
+  check_complete(start_transitions(), start_ignored(), start_state_count, start_event_count);
+  check_reachable(start_transitions(), start_state_count);
+  check_no_fall_through(start_transitions(), StartContext{});
 }
 
 TEST_CASE("the tracker's table answers every event in every state, whatever its counters say") {

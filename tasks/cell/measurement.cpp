@@ -1,7 +1,9 @@
-// What happens inside Execute: seek the edge, track the boundary, plan, scan, finish the fit.
+#include "tasks/cell/measurement.hpp"
+
 #include "hal/base/reserved.hpp"
-#include "tasks/cell/cell.hpp"
 #include "tasks/planning/tool_pose.hpp"
+
+#include <utility>
 
 namespace moldloft::tasks {
 
@@ -30,39 +32,66 @@ bool inside_quad(const std::array<Eigen::Vector2d, 4>& corners, const Eigen::Vec
 
 }  // namespace
 
-void Cell::set_phase(Phase phase) {
+Measurement::Measurement(const CellSettings& settings, Supervisor& supervisor, SurfaceTask& surface,
+                         ShotTaker& shots)
+    : settings_{settings},
+      supervisor_{supervisor},
+      surface_{surface},
+      shots_{shots},
+      tracker_{settings.tracker},
+      view_{settings.max_stripes, settings.max_points, settings.view},
+      surface_places_(settings.max_surface_shots),
+      time_left_{settings.tracker, settings.scan} {
+  boundary_places_.reserve(static_cast<std::size_t>(settings.tracker.max_shots) + 1);
+}
+
+// The background work outlives the cell; the frame that it reads and the view do not.
+Measurement::~Measurement() { surface_.begin(); }
+
+std::size_t Measurement::plan_bytes() const {
+  return view_.bytes() + tracker_.bytes() +
+         (boundary_places_.capacity() + surface_places_.capacity()) * sizeof(ShotPlace);
+}
+
+void Measurement::set_phase(Phase phase) {
   if (phase == phase_) return;
-  record("phase", "", to_string(phase_), to_string(phase));
+  supervisor_.record("phase", "", to_string(phase_), to_string(phase));
   phase_ = phase;
 }
 
-void Cell::measure() {
+void Measurement::begin() {
   set_phase(Phase::seek_edge);
   boundary_places_.clear();
   surface_planned_ = surface_next_ = 0;
   plan_begun_ = false;
   heights_.reset();
-  measuring_ = Duration{0};
+  spent_ = hal::Duration{0};
   time_left_.begin(settings_.start.centre.head<2>());
   surface_.begin();
   tracker_.begin(settings_.start);
-  want(settings_.start, ShotPurpose::seek);
+  shots_.order(settings_.start, ShotPurpose::seek);
+}
+
+void Measurement::forget() {
+  accepted_ = false;
+  frame_is_lost();
+  set_phase(Phase::none);
 }
 
 // Looks at what the background work has come to.
-void Cell::advance_phase() {
+void Measurement::step() {
   if (surface_.stage() == Stage::failed && phase_ != Phase::none) {
     const auto reason = geometry::to_string(surface_.error());
     const bool too_small = surface_.error() == geometry::Error::capacity;
-    return hold(too_small ? HoldCause::plan : HoldCause::measurement,
-                hal::Message::format("{}: {}", to_string(phase_), reason));
+    return supervisor_.hold(too_small ? HoldCause::plan : HoldCause::measurement,
+                            hal::Message::format("{}: {}", to_string(phase_), reason));
   }
   switch (phase_) {
     case Phase::plan_scan:
       if (surface_.outline_ready()) plan_surface();
       return;
     case Phase::scan_surface:
-      if (surface_next_ == surface_planned_ && !wanted_ && !looking_ && shot_state_ == ShotState::parked &&
+      if (surface_next_ == surface_planned_ && shots_.is_done() && !look_.is_held() &&
           surface_.stage() == Stage::open) {
         surface_.solve();
         set_phase(Phase::finish_fit);
@@ -70,17 +99,17 @@ void Cell::advance_phase() {
       return;
     case Phase::finish_fit:
       if (surface_.stage() != Stage::ready) return;
-      surface_ready_ = now_;
+      surface_ready_ = supervisor_.now();
       set_phase(Phase::none);
-      return apply(CellEvent::done);
+      return supervisor_.done();
     default:
       return;
   }
 }
 
 // Hands a shot's frame to the background work for finding the plate in it, which may begin before all of it is there;
-// use_shot() follows when that is done and the frame was accepted.
-void Cell::look_at(const Order& order, const hal::Frame& frame, hal::Scanner* unpacks) {
+// use_view() follows when that is done and the frame was accepted.
+void Measurement::frame_comes(const ShotOrder& order, const hal::Frame& frame, hal::Scanner* unpacks) {
   looked_at_ = order;
   const geometry::RigidMotion world_from_scanner =
       scanner_motion_at(order.reported, settings_.tip_from_scanner);
@@ -92,44 +121,51 @@ void Cell::look_at(const Order& order, const hal::Frame& frame, hal::Scanner* un
                .boundary = order.purpose != ShotPurpose::surface},
               unpacks);
   surface_.look(view_);
-  looking_ = true;
+  look_ = frame_.lend();
   accepted_ = false;
 }
 
 // What has been looked at so far was no frame: it will not become whole.
-void Cell::drop_look() {
-  if (!looking_ || accepted_) return;
+void Measurement::frame_is_lost() {
+  if (!look_.is_held() || accepted_) return;
   surface_.stop_looking();
-  looking_ = false;
+  look_.end();
 }
 
-void Cell::accept(const hal::Frame& frame) {
+void Measurement::frame_is_whole(const ShotOrder& order, const hal::Frame& frame, hal::Scanner* unpacks,
+                                 bool of_earlier_run) {
+  if (!look_.is_held()) frame_comes(order, frame, unpacks);
   accepted_ = true;
   ++taken_[static_cast<std::size_t>(looked_at_.purpose)];
   points_seen_ += frame.point_count;
   time_left_.took({.purpose = looked_at_.purpose,
                    .centre = looked_at_.place.centre.head<2>(),
-                   .spent = measuring_,
-                   .from_archive = archive_ != nullptr && looked_at_.number <= archive_->last()});
+                   .spent = spent_,
+                   .from_archive = of_earlier_run});
 }
 
-void Cell::use_shot() {
-  looking_ = false;
-  const Order& order = looked_at_;
+// The next frame overwrites the last one, and its points have somewhere to go.
+bool Measurement::takes_frame() const { return frame_.is_free() && !surface_.prepares(); }
+
+void Measurement::use_view() {
+  if (look_.is_held() && accepted_ && !surface_.looking()) use_shot(std::move(look_));
+}
+
+void Measurement::use_shot(FrameLease lease) {
   const geometry::RigidMotion world_from_scanner =
-      scanner_motion_at(order.reported, settings_.tip_from_scanner);
-  if (order.purpose == ShotPurpose::surface) {
-    if (view_.found()) surface_.fold(view_, world_from_scanner);
+      scanner_motion_at(looked_at_.reported, settings_.tip_from_scanner);
+  if (looked_at_.purpose == ShotPurpose::surface) {
+    if (view_.found()) surface_.fold(view_, world_from_scanner, std::move(lease));
     return;
   }
-  hal::add_within_reserve(boundary_places_, order.place);
+  hal::add_within_reserve(boundary_places_, looked_at_.place);
   const std::optional<double> height = view_.found() ? learn_heights(world_from_scanner) : std::nullopt;
-  if (height) surface_.keep(view_, world_from_scanner);
-  use_boundary_shot(order, world_from_scanner, height);
+  if (height) surface_.keep(view_, world_from_scanner, std::move(lease));
+  track(looked_at_, world_from_scanner, height);
 }
 
 // Adds the shot's heights to the rough model and gives their mean; nothing when what was found is the table.
-std::optional<double> Cell::learn_heights(const geometry::RigidMotion& world_from_scanner) {
+std::optional<double> Measurement::learn_heights(const geometry::RigidMotion& world_from_scanner) {
   HeightModel learnt = heights_;
   double sum = 0;
   int count = 0;
@@ -148,7 +184,7 @@ std::optional<double> Cell::learn_heights(const geometry::RigidMotion& world_fro
   return sum / count;
 }
 
-Eigen::Vector3d Cell::hint_in_world(const Order& order) const {
+Eigen::Vector3d Measurement::hint_in_world(const ShotOrder& order) const {
   if (order.purpose != ShotPurpose::surface) return tracker_.plate_hint();
   const auto& corners = surface_.outline().corners;
   const Eigen::Vector2d middle = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;
@@ -161,18 +197,18 @@ Eigen::Vector3d Cell::hint_in_world(const Order& order) const {
   return {p.x(), p.y(), heights_.at(p.x(), p.y())};
 }
 
-void Cell::use_boundary_shot(const Order& order, const geometry::RigidMotion& world_from_scanner,
-                             std::optional<double> plate_z_mm) {
+void Measurement::track(const ShotOrder& order, const geometry::RigidMotion& world_from_scanner,
+                        std::optional<double> plate_z_mm) {
   const auto step = tracker_.take({.world_from_scanner = world_from_scanner,
                                    .plate_found = plate_z_mm.has_value(),
                                    .plate_z_mm = plate_z_mm.value_or(0),
                                    .view = view_.boundary()});
-  record("tracker", to_string(step.event), to_string(step.from), to_string(step.to),
-         hal::Message::format("shot {}: {}", order.number, to_string(step.action)));
+  supervisor_.record("tracker", to_string(step.event), to_string(step.from), to_string(step.to),
+                     hal::Message::format("shot {}: {}", order.number, to_string(step.action)));
   switch (step.to) {
     case TrackState::failed:
-      return hold(step.action == TrackAction::report_too_large ? HoldCause::plan : HoldCause::measurement,
-                  step.text);
+      return supervisor_.hold(
+          step.action == TrackAction::report_too_large ? HoldCause::plan : HoldCause::measurement, step.text);
     case TrackState::closed:
       set_phase(Phase::plan_scan);
       heights_.solve();
@@ -186,11 +222,11 @@ void Cell::use_boundary_shot(const Order& order, const geometry::RigidMotion& wo
       break;
   }
   if (step.next)
-    want(*step.next, step.to == TrackState::seek_edge ? ShotPurpose::seek : ShotPurpose::boundary);
+    shots_.order(*step.next, step.to == TrackState::seek_edge ? ShotPurpose::seek : ShotPurpose::boundary);
 }
 
-// In the slack: what the rows of a zig-zag cost belongs into no tick.
-void Cell::plan_surface() {
+// Planning the zig-zag takes longer than a tick, so it runs in the slack.
+void Measurement::plan_surface() {
   if (!plan_begun_) {
     const auto& last = boundary_places_.back();
     zigzag_.begin(surface_.outline(), heights_, settings_.scan, last.centre.head<2>(), last.head_yaw,
@@ -201,16 +237,38 @@ void Cell::plan_surface() {
   if (surface_.planning()) return;
   const auto planned = zigzag_.result();
   if (!planned) {
-    return hold(HoldCause::plan, "the plate needs more shots than are planned for: raise [plate] largest_mm");
+    return supervisor_.hold(HoldCause::plan,
+                            "the plate needs more shots than are planned for: raise [plate] largest_mm");
   }
   surface_planned_ = *planned;
   surface_next_ = 0;
   set_phase(Phase::scan_surface);
-  next_surface_shot();
+  order_next();
 }
 
-void Cell::next_surface_shot() {
-  if (surface_next_ < surface_planned_) want(surface_places_[surface_next_++], ShotPurpose::surface);
+void Measurement::order_next() {
+  if (surface_next_ < surface_planned_) shots_.order(surface_places_[surface_next_++], ShotPurpose::surface);
+}
+
+void Measurement::arm_is_free() {
+  if (phase_ == Phase::scan_surface) order_next();
+}
+
+bool Measurement::visit_again(const ShotPlace& place) {
+  if (surface_planned_ == surface_places_.size()) return false;
+  surface_places_[surface_planned_++] = place;
+  return true;
+}
+
+double Measurement::part_done() const {
+  if (phase_ == Phase::scan_surface && surface_planned_ > 0)
+    return static_cast<double>(shots_taken(ShotPurpose::surface)) / static_cast<double>(surface_planned_);
+  return phase_ == Phase::finish_fit ? surface_.progress() : 0;
+}
+
+Measurement::Left Measurement::left() {
+  if (surface_planned_ > 0) time_left_.planned(surface_planned_);
+  return {.time = time_left_.left(spent_), .is_planned = time_left_.is_planned()};
 }
 
 }  // namespace moldloft::tasks
