@@ -31,6 +31,9 @@ TEST_CASE("a plate's name is one line of UTF-8, with any letters, quotes and sla
   }
   CHECK(one_line("  plate 4 ", "--plate", longest_plate_name).value_or("refused") == "plate 4");
   CHECK(one_line(std::string(100, 'p'), "--plate", longest_plate_name).has_value());
+  std::string hundred;  // letters, of two bytes each
+  for (int i = 0; i < 100; ++i) hundred += "\xC3\x9F";
+  CHECK(one_line(hundred, "--plate", longest_plate_name).value_or("refused") == hundred);
 }
 
 TEST_CASE("what cannot be a name is refused with where and why, and never shown") {

@@ -2,14 +2,18 @@
 #include "firmware_like/gateway/operator_channel.hpp"
 
 #include "firmware_like/controller/controller.hpp"
+#include "firmware_like/forked.hpp"
 #include "firmware_like/process/complaint.hpp"
+#include "hal/file_text.hpp"
 #include "hal/links/cable.hpp"
 #include "hal/temporary_folder.hpp"
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <array>
+#include <fcntl.h>
 #include <filesystem>
 #include <fstream>
 #include <future>
@@ -171,8 +175,20 @@ TEST_CASE("the only running cell is found by itself, whatever dead ones have lef
 
 TEST_CASE("a word is looked at before any socket is, and a wrong one is answered with all that there are") {
   CHECK(operator_words() == "start, hold, unhold, stop, abort, clear, reset, status");
+  const hal::TemporaryFolder folder;
+  const auto said_to = [&](const char* word) {
+    return test::in_child({}, [&] {
+      const std::string said = folder.file("said");
+      ::dup2(::open(said.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDERR_FILENO);
+      const int code = tell_cell({.word = word, .control = "/nowhere/control"});
+      return fmt::format("{} {}", code, hal::text_of(said));
+    });
+  };
   for (const char* word : {"dance", "", "un hold", "unhold now", "status\nstop"})
-    CHECK(tell_cell({.word = word, .control = "/nowhere/control"}) == exit_failed);
+    CHECK(said_to(word).find("is no word that a cell knows; known: " + operator_words()) !=
+          std::string::npos);
+  for (const char* word : {"status", "STOP", " Unhold\n"})
+    CHECK(said_to(word).starts_with("1 moldloft: /nowhere/control: "));
 }
 
 TEST_CASE("a cell that never answers is given up after a bounded wait, and what it was told is named") {

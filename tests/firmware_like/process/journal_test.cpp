@@ -22,6 +22,8 @@ TEST_CASE("the journal is known by the device and inode that systemd names, and 
   const std::string stream = fmt::format("{}:{}", what.st_dev, what.st_ino);
   CHECK(is_journal(pipe[1], stream.c_str()));
   CHECK_FALSE(is_journal(other[1], stream.c_str()));  // redirected: the variable is inherited all the same
+  const std::string elsewhere = fmt::format("{}:{}", what.st_dev + 1, what.st_ino);
+  CHECK_FALSE(is_journal(pipe[1], elsewhere.c_str()));
   CHECK_FALSE(is_journal(pipe[1], nullptr));
   CHECK_FALSE(is_journal(pipe[1], ""));
   CHECK_FALSE(is_journal(pipe[1], "nonsense"));

@@ -85,6 +85,7 @@ TEST_CASE("a text that is too long is cut between characters, and says so") {
   const std::string degrees = "°°°°°°°°°°";  // two bytes each
   CHECK(printable(degrees, 20) == degrees);
   CHECK(printable(degrees, 19) == "°°°°°°°°...");
+  CHECK(printable(degrees, 18) == "°°°°°°°...");  // 15 bytes would end within a character
   CHECK(printable(std::string(100'000, 'x'), 10) == "xxxxxxx...");
   CHECK(printable(std::string(100'000, '\xB0')).size() <= longest_printable);
   CHECK(printable(std::string(100'000, '\0')).size() == longest_printable);

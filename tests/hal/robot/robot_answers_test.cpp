@@ -117,6 +117,9 @@ TEST_CASE("an answer of the wrong form is shown with what is wrong with it, thou
     CHECK(why.find("cannot be read, "s + answer.what) != std::string::npos);
     CHECK(why.find("\"<"s + answer.text) != std::string::npos);
     CHECK(cell.count(Kind::ready) == 0);
+    Cell at_once;
+    at_once.answer(answer.verb, answer.text);
+    CHECK(at_once.why_after(1s).find("cannot be read, "s + answer.what) != std::string::npos);
   }
 }
 
@@ -172,6 +175,20 @@ TEST_CASE("numbers that are none, or too long, never pass for a pose") {
   CHECK_FALSE(std::signbit(reads("-0.000")->pose.x_mm));
   CHECK(reads("999999.999")->pose.x_mm == 999999.999);
   CHECK(reads("000007.5")->pose.x_mm == 7.5);
+}
+
+TEST_CASE("a line of 120 characters is told by what is wrong in it, one of 121 by its length") {
+  for (const std::size_t length : {120, 121}) {
+    CAPTURE(length);
+    Cell cell;
+    cell.peer.on_reply = [=](std::string& line) {
+      line = "<" + std::string(length - 1, 'x') + "\n";
+      return true;
+    };
+    const std::string why = cell.why_after(9s);
+    CHECK(why.find("cannot be read, ") != std::string::npos);
+    CHECK((why.find("longer than 120 characters") != std::string::npos) == (length == 121));
+  }
 }
 
 TEST_CASE("a line of 120 characters is read, one of 121 is not, and CR and empty lines change nothing") {

@@ -70,6 +70,19 @@ TEST_CASE("a HELLO that cannot be true is unfit, and shows what was said") {
   CHECK(unfit([](Hello& h) { h.exposure_us = h.processing_us = 4'294'967'295; }).empty());  // for people only
 }
 
+TEST_CASE("a scanner's name ends at the first NUL, whatever stands behind it") {
+  Cell cell;
+  cell.peer.on_send = [&](std::vector<std::byte>& message, psc1::Type type) {
+    if (type != psc1::Type::hello) return true;
+    auto hello = *psc1::decode_hello_reply(std::span{message}.subspan(psc1::header_size, 48));
+    hello.sensor = {'S', '1', '2', '\0', 'o', 'l', 'd'};
+    message.resize(psc1::encode(1, hello, message));
+    return true;
+  };
+  cell.start();
+  CHECK(cell.scanner.info().sensor.view() == "S12");
+}
+
 TEST_CASE("a scanner's name is shown as text, whatever its bytes are") {
   Cell cell;
   cell.peer.on_send = [&](std::vector<std::byte>& message, psc1::Type type) {
