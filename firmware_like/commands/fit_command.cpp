@@ -17,7 +17,7 @@ namespace moldloft::firmware_like {
 namespace {
 
 // As it is told apart from other runs, whichever way it is named.
-std::string place_of(const std::string& run) {
+std::string canonical_name(const std::string& run) {
   std::error_code failed;
   const auto place = std::filesystem::canonical(run, failed);
   return failed ? run : place.string();
@@ -40,7 +40,7 @@ std::expected<RunFolder, Failure> folder_for_fit(const FitOptions& options) {
   if (!claim) return std::unexpected{claim.error()};
   const auto before = read_json(out / "summary.json");
   const bool is_ours = before && before->is_object() && before->contains("fitted_from") &&
-                       (*before)["fitted_from"] == place_of(options.run);
+                       (*before)["fitted_from"] == canonical_name(options.run);
   if (!options.force && (holds_run(out) || (holds_results(out) && !is_ours)))
     return refused("holds another run's results; give another --out, or --force to write over them");
   return RunFolder{.path = out, .claim = std::move(*claim), .store = nullptr, .archive = nullptr};
@@ -65,7 +65,7 @@ int fit_run(const FitOptions& options) {
   RunResult result = result_of(
       *controller,
       {.plate = run->names.plate, .seed = {}, .begun = begun_of(*run), .remark = run->names.remark});
-  result.fitted_from = place_of(options.run);
+  result.fitted_from = canonical_name(options.run);
   auto results = folder_for_fit(options);
   if (!results) return complain(results.error().what);
   results->store = std::move(run->store);

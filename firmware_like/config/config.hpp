@@ -62,7 +62,8 @@ struct CellConfig {
   tasks::MissedTickPolicy missed_ticks = tasks::MissedTickPolicy::skip_keep_phase;
   hal::Duration device_timeout = std::chrono::seconds{10};
   hal::Duration scanner_wait = std::chrono::seconds{300};  // long enough for a scanner to boot, twice
-  hal::Duration disk_wait = std::chrono::seconds{600};     // long enough for a person to find what can be deleted
+  hal::Duration disk_wait =
+      std::chrono::seconds{600};  // long enough for a person to find what can be deleted
   ScannerConfig scanner;
   RobotConfig robot;
   PlateConfig plate;

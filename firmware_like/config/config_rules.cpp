@@ -2,6 +2,7 @@
 
 #include "firmware_like/config/cell_settings.hpp"
 #include "firmware_like/config/config.hpp"
+#include "firmware_like/config/device_makes.hpp"
 #include "firmware_like/config/plate_name.hpp"
 #include "tasks/cell/motion_guard.hpp"
 #include "tasks/planning/tool_pose.hpp"
@@ -103,6 +104,22 @@ MaybeFinding same_place(const CellConfig& c) {
   return error(
       {"robot." + key, "robot.port", "robot.link", "scanner." + key, "scanner.link"},
       fmt::format("[robot] {}: {} is the scanner's too; each device has a place of its own", key, place));
+}
+
+// A serial line brings a tenth of its baud rate in bytes. A scanner may send less than the configuration allows.
+MaybeFinding frames_over_a_serial_line(const CellConfig& c) {
+  const ScannerMake* make = find_scanner_make(c.scanner.driver);
+  if (c.scanner.place.link != "serial" || make == nullptr || c.scanner.place.baud <= 0) return {};
+  const std::size_t bytes = make->largest_frame_bytes(c.scanner);
+  const double seconds = 10.0 * static_cast<double>(bytes) / c.scanner.place.baud,
+               limit = std::chrono::duration<double>(make->frame_timeout).count();
+  if (seconds <= limit) return {};
+  return warning(
+      {"scanner.baud", "scanner.link"},
+      fmt::format(
+          "[scanner] baud: a frame of {} bytes takes {:.1f} s at {} baud, and the driver waits {} s for "
+          "it; take a faster link, or fewer points",
+          bytes, seconds, c.scanner.place.baud, limit));
 }
 
 MaybeFinding speed(const CellConfig& c) {
@@ -316,6 +333,7 @@ std::vector<ConfigFinding> contradictions(const CellConfig& c) {
                           of_robot<device>,
                           of_robot<baud>,
                           same_place,
+                          frames_over_a_serial_line,
                           speed,
                           seek_over_step_limit,
                           reach,

@@ -32,7 +32,8 @@ std::unique_ptr<hal::Robot> line_robot(const RobotConfig& config, hal::ByteLink&
 
 std::vector<ScannerMake>& scanners() {
   static std::vector<ScannerMake> makes = {
-      {"psc1", &hal::psc1::frame_codec, largest_psc_frame, psc_scanner},
+      {"psc1", &hal::psc1::frame_codec, largest_psc_frame, psc_scanner,
+       hal::PscScanner::Settings{}.frame_timeout},
   };
   return makes;
 }

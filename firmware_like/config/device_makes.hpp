@@ -26,6 +26,7 @@ struct ScannerMake {
   // What a frame of the configured size takes on the link at most, head and all.
   std::size_t (*largest_frame_bytes)(const ScannerConfig&) = nullptr;
   std::unique_ptr<hal::Scanner> (*driver)(const ScannerConfig&, hal::ByteLink&) = nullptr;
+  hal::Duration frame_timeout = std::chrono::seconds{2};  // how long the driver waits for a whole frame
 };
 
 struct RobotMake {

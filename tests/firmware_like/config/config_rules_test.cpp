@@ -87,6 +87,12 @@ TEST_CASE("a host that has a port in it, or is a URL, is empty or has a blank, i
   }
 }
 
+TEST_CASE("a scanner whose frames fit through its serial line in time is not warned of") {
+  CHECK(told("[scanner]\nlink = \"serial\"\ndevice = \"/dev/ttyS9\"\nbaud = 921600\nmax_stripes = 50\n")
+            .empty());
+  CHECK(told("[scanner]\nbaud = 1200\n").empty());  // the link is a socket
+}
+
 TEST_CASE("values that look like a slip are warnings, and a run takes them") {
   const auto warns = [](const std::string& text, const std::string& begins) {
     CHECK(refusal(text) == "");
@@ -96,6 +102,8 @@ TEST_CASE("values that look like a slip are warnings, and a run takes them") {
         std::ranges::any_of(lines, [&](const auto& l) { return l.starts_with("warning " + begins); }),
         (lines.empty() ? "nothing" : lines.front()));
   };
+  warns("[scanner]\nlink = \"serial\"\ndevice = \"/dev/ttyS9\"\nbaud = 921600\n",
+        "4 [scanner] baud: a frame of 35");  // 100 stripes of 500 points take 3.8 s
   warns("[scanner.mount]\ntranslation_mm = [0, 0.14, 0.3]\n[robot.workspace]\nz_mm = [0, 600]\n",
         "2 [scanner.mount] translation_mm: the scanner sits 0.331 mm from the tip; metres?");
   warns("[scanner.mount]\nzyz_deg = [0, 3.14159, 3.14159]\n", "2 [scanner.mount] zyz_deg: ");
