@@ -1,0 +1,66 @@
+#include "tasks/planning/outline_words.hpp"
+
+#include <algorithm>
+
+namespace moldloft::tasks {
+namespace {
+
+using Kind = geometry::OutlineDeviation::Kind;
+
+// Distances below a centimetre are told apart by their tenths.
+hal::FixedText<16> mm(double value) {
+  return value < 9.95 ? hal::FixedText<16>::format("{:.1f} mm", value)
+                      : hal::FixedText<16>::format("{:.0f} mm", value);
+}
+
+hal::Message corner_cut(const geometry::OutlineDeviation& d) {
+  const double more = std::max(d.leg_before_mm, d.leg_after_mm),
+               less = std::min(d.leg_before_mm, d.leg_after_mm);
+  if (less > 0.8 * more)
+    return hal::Message::format("the corner at ({:.0f}, {:.0f}) is cut by {}", d.place.x(), d.place.y(),
+                                mm((more + less) / 2).view());
+  return hal::Message::format("the corner at ({:.0f}, {:.0f}) is cut by {} and {}", d.place.x(), d.place.y(),
+                              mm(d.leg_before_mm).view(), mm(d.leg_after_mm).view());
+}
+
+hal::Message corner_missing(const geometry::OutlineDeviation& d) {
+  if (d.outwards_mm > d.inwards_mm)
+    return hal::Message::format("the plate goes on beyond the corner at ({:.0f}, {:.0f}), by up to {}",
+                                d.place.x(), d.place.y(), mm(d.outwards_mm).view());
+  return hal::Message::format(
+      "the corner at ({:.0f}, {:.0f}) is missing: {} and {} of its sides, up to {} deep", d.place.x(),
+      d.place.y(), mm(d.leg_before_mm).view(), mm(d.leg_after_mm).view(), mm(d.inwards_mm).view());
+}
+
+}  // namespace
+
+hal::Message words_of(const geometry::OutlineDeviation& d) {
+  const double x = d.place.x(), y = d.place.y();
+  const bool inwards = d.inwards_mm >= d.outwards_mm;
+  switch (d.kind) {
+    case Kind::step:
+      return hal::Message::format("a step of {} {} over {} of the side at ({:.0f}, {:.0f})",
+                                  mm(d.distance_mm()).view(), inwards ? "inwards" : "outwards",
+                                  mm(d.length_mm).view(), x, y);
+    case Kind::corner_cut:
+      return corner_cut(d);
+    case Kind::corner_rounded:
+      return hal::Message::format("the corner at ({:.0f}, {:.0f}) is rounded, radius about {}", x, y,
+                                  mm(d.radius_mm).view());
+    case Kind::corner_missing:
+      return corner_missing(d);
+    case Kind::ragged:
+      return hal::Message::format("a ragged rim, up to {}, from ({:.0f}, {:.0f}) to ({:.0f}, {:.0f})",
+                                  mm(d.distance_mm()).view(), d.from.x(), d.from.y(), d.to.x(), d.to.y());
+    case Kind::unseen:
+      return hal::Message::format("{} of the edge at ({:.0f}, {:.0f}) were not seen", mm(d.length_mm).view(),
+                                  x, y);
+    case Kind::apart:
+      return hal::Message::format(
+          "an edge {} {} the outline at ({:.0f}, {:.0f}), beside the one that was seen there",
+          mm(d.distance_mm()).view(), inwards ? "inside" : "outside", x, y);
+  }
+  return {};
+}
+
+}  // namespace moldloft::tasks
