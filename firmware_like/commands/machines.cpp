@@ -4,6 +4,7 @@
 #include "hal/scanner/psc_table.hpp"
 #include "tasks/machines/boundary_tracker.hpp"
 #include "tasks/machines/cell_state.hpp"
+#include "tasks/machines/phases.hpp"
 #include "tasks/machines/shot_sequence.hpp"
 #include "tasks/machines/start_sequence.hpp"
 
@@ -34,16 +35,25 @@ struct Machine {
   std::vector<Row> rows;            // in the order of the table
 };
 
+// A state without a name is the one before and after everything: Mermaid's point of start and end.
+constexpr std::string_view nowhere = "[*]";
+
+template <typename State>
+std::string name_of(State state) {
+  const std::string_view name = to_string(state);
+  return std::string{name.empty() ? nowhere : name};
+}
+
 template <typename State, typename Table>
 Machine machine_of(Table table, int state_count) {
   Machine machine;
-  for (int s = 0; s < state_count; ++s) machine.states.emplace_back(to_string(static_cast<State>(s)));
+  for (int s = 0; s < state_count; ++s) machine.states.push_back(name_of(static_cast<State>(s)));
   for (const auto& row : table) {
-    Row r{.from = std::string{to_string(row.from)},
+    Row r{.from = name_of(row.from),
           .event = std::string{to_string(row.on)},
           .guard = std::string{row.guard.name},
           .action = std::string{to_string(row.action)},
-          .to = std::string{to_string(row.to)}};
+          .to = name_of(row.to)};
     const bool has_rival = std::ranges::any_of(
         machine.rows, [&](const Row& before) { return before.from == r.from && before.event == r.event; });
     if (r.guard.empty() && has_rival) r.guard = "else";
@@ -120,7 +130,7 @@ std::string diagram(const Machine& machine) {
   for (const auto& state : machine.states) {
     if (word(state) != state) text += fmt::format("  state \"{}\" as {}\n", state, word(state));
   }
-  text += fmt::format("  [*] --> {}\n", word(machine.states.front()));
+  if (machine.states.front() != nowhere) text += fmt::format("  [*] --> {}\n", word(machine.states.front()));
   const auto folded = folded_events(machine);
   for (const auto& from : machine.states) {
     bool leaves = false;
@@ -150,10 +160,12 @@ std::string driver_diagrams() {
 std::string cell_diagrams() {
   const auto cell = machine_of<tasks::CellState>(tasks::cell_transitions(), tasks::cell_state_count);
   const auto start = machine_of<tasks::StartState>(tasks::start_transitions(), tasks::start_state_count);
+  const auto phases = machine_of<tasks::Phase>(tasks::phase_transitions(), tasks::phase_count);
   const auto shots = machine_of<tasks::ShotState>(tasks::shot_transitions(), tasks::shot_state_count);
   const auto tracker = machine_of<tasks::TrackState>(tasks::track_transitions(), tasks::track_state_count);
   return fmt::format("### Supervisor (`machines/cell_state.cpp`)\n\n{}\n", diagram(cell)) +
          fmt::format("### Start of the devices (`machines/start_sequence.cpp`)\n\n{}\n", diagram(start)) +
+         fmt::format("### Phases of Execute (`machines/phases.cpp`)\n\n{}\n", diagram(phases)) +
          fmt::format("### Shot sequence (`machines/shot_sequence.cpp`)\n\n{}\n", diagram(shots)) +
          fmt::format("### Boundary tracker (`machines/track_table.cpp`)\n\n{}", diagram(tracker));
 }

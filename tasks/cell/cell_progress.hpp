@@ -5,6 +5,7 @@
 #include "hal/base/clock.hpp"
 #include "hal/base/fixed_text.hpp"
 #include "tasks/machines/cell_state.hpp"
+#include "tasks/machines/phases.hpp"
 
 #include <cstdint>
 

@@ -53,14 +53,75 @@ std::size_t Measurement::plan_bytes() const {
          (boundary_places_.capacity() + surface_places_.capacity()) * sizeof(ShotPlace);
 }
 
-void Measurement::set_phase(Phase phase) {
-  if (phase == phase_) return;
-  supervisor_.record("phase", "", to_string(phase_), to_string(phase));
-  phase_ = phase;
+void Measurement::begin() { apply(PhaseEvent::begin); }
+
+void Measurement::forget() {
+  accepted_ = false;
+  frame_is_lost();
+  apply(PhaseEvent::forget);
 }
 
-void Measurement::begin() {
-  set_phase(Phase::seek_edge);
+// Looks at what the background work has come to; what the tracker comes to is told in track().
+void Measurement::step() {
+  if (surface_.stage() == Stage::failed)
+    return apply(PhaseEvent::flaw, {.beyond_plan = surface_.error() == geometry::Error::capacity});
+  switch (phase_) {
+    case Phase::plan_scan:
+      if (!surface_.outline_ready()) return;
+      if (!plan_begun_) return apply(PhaseEvent::outline_ready);
+      if (!surface_.planning()) apply(PhaseEvent::zigzag_ready, {.beyond_plan = !zigzag_.result()});
+      return;
+    case Phase::scan_surface:
+      if (surface_next_ == surface_planned_ && shots_.is_done() && !look_.is_held() &&
+          surface_.stage() == Stage::open)
+        apply(PhaseEvent::all_taken);
+      return;
+    case Phase::finish_fit:
+      if (surface_.stage() == Stage::ready) apply(PhaseEvent::surface_ready);
+      return;
+    default:
+      return;
+  }
+}
+
+void Measurement::apply(PhaseEvent event, const PhaseContext& context) {
+  const auto* row = find_transition(phase_transitions(), phase_, event, context);
+  if (row == nullptr) return;
+  if (row->to != phase_) supervisor_.record("phase", "", to_string(phase_), to_string(row->to));
+  phase_ = row->to;
+  carry_out(row->action);
+}
+
+void Measurement::carry_out(PhaseAction action) {
+  switch (action) {
+    case PhaseAction::seek:
+      return seek();
+    case PhaseAction::note_edge:
+      return time_left_.edge_is_found();
+    case PhaseAction::build_outline:
+      return build_outline();
+    case PhaseAction::plan_zigzag:
+      return plan_zigzag();
+    case PhaseAction::scan:
+      return scan();
+    case PhaseAction::solve:
+      return surface_.solve();
+    case PhaseAction::finish:
+      surface_ready_ = supervisor_.now();
+      return supervisor_.done();
+    case PhaseAction::report_too_many_shots:
+      return supervisor_.hold(HoldCause::plan,
+                              "the plate needs more shots than are planned for: raise [plate] largest_mm");
+    case PhaseAction::report_too_large:
+      return hold_for_flaw(HoldCause::plan);
+    case PhaseAction::report_flaw:
+      return hold_for_flaw(HoldCause::measurement);
+    case PhaseAction::none:
+      return;
+  }
+}
+
+void Measurement::seek() {
   boundary_places_.clear();
   surface_planned_ = surface_next_ = 0;
   plan_begun_ = false;
@@ -72,39 +133,30 @@ void Measurement::begin() {
   shots_.order(settings_.start, ShotPurpose::seek);
 }
 
-void Measurement::forget() {
-  accepted_ = false;
-  frame_is_lost();
-  set_phase(Phase::none);
+void Measurement::build_outline() {
+  heights_.solve();
+  time_left_.boundary_is_closed();
+  surface_.build_outline(tracker_.edge_points(), tracker_.corners());
 }
 
-// Looks at what the background work has come to.
-void Measurement::step() {
-  if (surface_.stage() == Stage::failed && phase_ != Phase::none) {
-    const auto reason = geometry::to_string(surface_.error());
-    const bool too_small = surface_.error() == geometry::Error::capacity;
-    return supervisor_.hold(too_small ? HoldCause::plan : HoldCause::measurement,
-                            hal::Message::format("{}: {}", to_string(phase_), reason));
-  }
-  switch (phase_) {
-    case Phase::plan_scan:
-      if (surface_.outline_ready()) plan_surface();
-      return;
-    case Phase::scan_surface:
-      if (surface_next_ == surface_planned_ && shots_.is_done() && !look_.is_held() &&
-          surface_.stage() == Stage::open) {
-        surface_.solve();
-        set_phase(Phase::finish_fit);
-      }
-      return;
-    case Phase::finish_fit:
-      if (surface_.stage() != Stage::ready) return;
-      surface_ready_ = supervisor_.now();
-      set_phase(Phase::none);
-      return supervisor_.done();
-    default:
-      return;
-  }
+// Planning the zig-zag takes longer than a tick, so it runs in the slack.
+void Measurement::plan_zigzag() {
+  const auto& last = boundary_places_.back();
+  zigzag_.begin(surface_.outline(), heights_, settings_.scan, last.centre.head<2>(), last.head_yaw,
+                surface_places_);
+  surface_.plan(zigzag_);
+  plan_begun_ = true;
+}
+
+void Measurement::scan() {
+  surface_planned_ = *zigzag_.result();
+  surface_next_ = 0;
+  order_next();
+}
+
+void Measurement::hold_for_flaw(HoldCause cause) {
+  supervisor_.hold(cause,
+                   hal::Message::format("{}: {}", to_string(phase_), geometry::to_string(surface_.error())));
 }
 
 // Hands a shot's frame to the background work for finding the plate in it, which may begin before all of it is there;
@@ -210,40 +262,15 @@ void Measurement::track(const ShotOrder& order, const geometry::RigidMotion& wor
       return supervisor_.hold(
           step.action == TrackAction::report_too_large ? HoldCause::plan : HoldCause::measurement, step.text);
     case TrackState::closed:
-      set_phase(Phase::plan_scan);
-      heights_.solve();
-      time_left_.boundary_is_closed();
-      return surface_.build_outline(tracker_.edge_points(), tracker_.corners());
+      return apply(PhaseEvent::loop_closed);
     case TrackState::seek_edge:
       break;
     default:
-      time_left_.edge_is_found();
-      set_phase(Phase::track_boundary);
+      apply(PhaseEvent::edge_found);
       break;
   }
   if (step.next)
     shots_.order(*step.next, step.to == TrackState::seek_edge ? ShotPurpose::seek : ShotPurpose::boundary);
-}
-
-// Planning the zig-zag takes longer than a tick, so it runs in the slack.
-void Measurement::plan_surface() {
-  if (!plan_begun_) {
-    const auto& last = boundary_places_.back();
-    zigzag_.begin(surface_.outline(), heights_, settings_.scan, last.centre.head<2>(), last.head_yaw,
-                  surface_places_);
-    surface_.plan(zigzag_);
-    plan_begun_ = true;
-  }
-  if (surface_.planning()) return;
-  const auto planned = zigzag_.result();
-  if (!planned) {
-    return supervisor_.hold(HoldCause::plan,
-                            "the plate needs more shots than are planned for: raise [plate] largest_mm");
-  }
-  surface_planned_ = *planned;
-  surface_next_ = 0;
-  set_phase(Phase::scan_surface);
-  order_next();
 }
 
 void Measurement::order_next() {

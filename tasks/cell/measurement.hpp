@@ -1,5 +1,5 @@
-// What happens inside Execute: seek the edge, track the boundary, plan, scan, finish the fit. Orders the shots that
-// this takes, looks at their frames, and gives what they show to the tracker and to the background work.
+// What happens inside Execute, phase by phase (the table is phases.hpp): orders the shots that this takes, looks at
+// their frames, and gives what they show to the tracker and to the background work.
 //
 // Frames       world for places and heights; the frames are the scanner's and are registered with the shot's pose
 // Thread       the control thread
@@ -14,6 +14,7 @@
 #include "tasks/cell/supervisor.hpp"
 #include "tasks/cell/time_left.hpp"
 #include "tasks/machines/boundary_tracker.hpp"
+#include "tasks/machines/phases.hpp"
 #include "tasks/planning/height_model.hpp"
 #include "tasks/planning/scan_plan.hpp"
 #include "tasks/slices/frame_lease.hpp"
@@ -75,12 +76,17 @@ class Measurement final : public ShotUser {
   std::size_t plan_bytes() const;
 
  private:
-  void set_phase(Phase) MOLDLOFT_NONBLOCKING;
+  void apply(PhaseEvent, const PhaseContext& = {}) MOLDLOFT_NONBLOCKING;
+  void carry_out(PhaseAction) MOLDLOFT_NONBLOCKING;
+  void seek() MOLDLOFT_NONBLOCKING;
+  void build_outline() MOLDLOFT_NONBLOCKING;
+  void plan_zigzag() MOLDLOFT_NONBLOCKING;
+  void scan() MOLDLOFT_NONBLOCKING;
+  void hold_for_flaw(HoldCause) MOLDLOFT_NONBLOCKING;
   void use_shot(FrameLease) MOLDLOFT_NONBLOCKING;
   std::optional<double> learn_heights(const geometry::RigidMotion& world_from_scanner) MOLDLOFT_NONBLOCKING;
   void track(const ShotOrder&, const geometry::RigidMotion& world_from_scanner,
              std::optional<double> plate_z_mm) MOLDLOFT_NONBLOCKING;
-  void plan_surface() MOLDLOFT_NONBLOCKING;
   Eigen::Vector3d hint_in_world(const ShotOrder&) const MOLDLOFT_NONBLOCKING;
 
   const CellSettings& settings_;

@@ -91,8 +91,6 @@ constexpr std::array<std::string_view, cell_event_count> event_names = {
 constexpr std::array<std::string_view, 11> action_names = {
     "none", "connect and calibrate", "wait for operator", "measure", "flush records", "let motion end", "take up again", "stop motion",
     "drop everything", "synchronise again", "forget run"};
-constexpr std::array<std::string_view, 6> phase_names = {
-    "", "SeekEdge", "TrackBoundary", "PlanScan", "ScanSurface", "FinishFit"};
 // clang-format on
 
 }  // namespace
@@ -103,6 +101,5 @@ std::span<const hal::Ignored<CellState, CellEvent>> cell_ignored() { return igno
 std::string_view to_string(CellState s) { return state_names[static_cast<std::size_t>(s)]; }
 std::string_view to_string(CellEvent e) { return event_names[static_cast<std::size_t>(e)]; }
 std::string_view to_string(CellAction a) { return action_names[static_cast<std::size_t>(a)]; }
-std::string_view to_string(Phase p) { return phase_names[static_cast<std::size_t>(p)]; }
 
 }  // namespace moldloft::tasks

@@ -69,8 +69,4 @@ std::string_view to_string(CellState) MOLDLOFT_NONBLOCKING;
 std::string_view to_string(CellEvent) MOLDLOFT_NONBLOCKING;
 std::string_view to_string(CellAction);
 
-// Inside Execute.
-enum class Phase : std::uint8_t { none, seek_edge, track_boundary, plan_scan, scan_surface, finish_fit };
-std::string_view to_string(Phase) MOLDLOFT_NONBLOCKING;
-
 }  // namespace moldloft::tasks

@@ -5,6 +5,7 @@
 #include "hal/scanner/psc_table.hpp"
 #include "tasks/machines/boundary_tracker.hpp"
 #include "tasks/machines/cell_state.hpp"
+#include "tasks/machines/phases.hpp"
 #include "tasks/machines/shot_sequence.hpp"
 #include "tasks/machines/start_sequence.hpp"
 
@@ -34,6 +35,7 @@ std::string section(std::string_view text, std::string_view file) {
 }
 
 std::string word(std::string name) {
+  if (name.empty()) return "[*]";  // before and after everything
   std::erase(name, ',');
   for (char& c : name) c = c == ' ' ? '_' : c;
   return name;
@@ -60,10 +62,13 @@ void check_every_row_has_its_arrow(const std::string& diagram, Table table) {
 
 }  // namespace
 
-TEST_CASE("every row of the tracker, the start and the shot sequence is an arrow with its event and action") {
+TEST_CASE(
+    "every row of the tracker, the start, the phases and the shot sequence is an arrow with its event and "
+    "action") {
   const std::string text = firmware_like::cell_diagrams();
   check_every_row_has_its_arrow(section(text, "track_table.cpp"), tasks::track_transitions());
   check_every_row_has_its_arrow(section(text, "start_sequence.cpp"), tasks::start_transitions());
+  check_every_row_has_its_arrow(section(text, "phases.cpp"), tasks::phase_transitions());
   check_every_row_has_its_arrow(section(text, "shot_sequence.cpp"), tasks::shot_transitions());
 }
 

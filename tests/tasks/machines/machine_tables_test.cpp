@@ -3,6 +3,7 @@
 #include "hal/complete_table.hpp"
 #include "tasks/machines/boundary_tracker.hpp"
 #include "tasks/machines/cell_state.hpp"
+#include "tasks/machines/phases.hpp"
 #include "tasks/machines/shot_sequence.hpp"
 #include "tasks/machines/start_sequence.hpp"
 
@@ -21,6 +22,29 @@ TEST_CASE("the supervisor's table answers every event in every state") {
 TEST_CASE("the shot sequence's table answers every event in every state") {
   check_complete(shot_transitions(), shot_ignored(), shot_state_count, shot_event_count);
   check_reachable(shot_transitions(), shot_state_count);
+}
+
+TEST_CASE(
+    "the phases' table answers every event in every phase, whether or not the memory plan is outgrown") {
+  check_complete(phase_transitions(), phase_ignored(), phase_count, phase_event_count);
+  check_reachable(phase_transitions(), phase_count);
+  check_no_fall_through(phase_transitions(), PhaseContext{});
+}
+
+TEST_CASE("only a zig-zag with room for its shots is scanned, and no phase is left over a flaw") {
+  const auto after = [](Phase phase, PhaseEvent event, bool beyond_plan) {
+    return find_transition(phase_transitions(), phase, event, PhaseContext{.beyond_plan = beyond_plan});
+  };
+  CHECK(after(Phase::plan_scan, PhaseEvent::zigzag_ready, false)->to == Phase::scan_surface);
+  CHECK(after(Phase::plan_scan, PhaseEvent::zigzag_ready, true)->to == Phase::plan_scan);
+  for (const Phase phase : {Phase::plan_scan, Phase::scan_surface, Phase::finish_fit}) {
+    for (const bool beyond_plan : {false, true}) {
+      const auto* row = after(phase, PhaseEvent::flaw, beyond_plan);
+      REQUIRE(row != nullptr);
+      CHECK(row->to == phase);
+      CHECK(row->action == (beyond_plan ? PhaseAction::report_too_large : PhaseAction::report_flaw));
+    }
+  }
 }
 
 TEST_CASE("the start sequence's table answers every event in every state, whatever the devices say") {
