@@ -1,10 +1,12 @@
-// Who reads a frame keeps the next one away: from the first byte until its view has been used, or it is lost.
+// Who reads a frame keeps the next one away: from the first byte until its view has been used, or it is lost. So does a
+// surface whose sums still hold what the plate before has left.
 #include "tasks/cell/measurement.hpp"
 
 #include "tasks/scripted_devices.hpp"
 
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -59,6 +61,22 @@ struct Bench final : CellActions {
                   measurement};
 };
 
+constexpr double long_side_mm = 400, short_side_mm = 300, edge_step_mm = 2;
+
+const std::array<Eigen::Vector2d, 4> rectangle = {
+    {{0, 0}, {long_side_mm, 0}, {long_side_mm, short_side_mm}, {0, short_side_mm}}};
+
+// Once round the rectangle.
+std::vector<Eigen::Vector2d> rectangle_edge() {
+  std::vector<Eigen::Vector2d> edge;
+  for (std::size_t side = 0; side < rectangle.size(); ++side) {
+    const Eigen::Vector2d along = rectangle[(side + 1) % rectangle.size()] - rectangle[side];
+    for (double s = edge_step_mm / 2; s < along.norm(); s += edge_step_mm)
+      edge.emplace_back(rectangle[side] + s * along.normalized());
+  }
+  return edge;
+}
+
 }  // namespace
 
 TEST_CASE("a frame that is looked at keeps the next one away until its view has been used") {
@@ -110,4 +128,26 @@ TEST_CASE("an arm in place waits with its exposure while somebody still reads th
   while (b.surface.looking()) b.surface.step(0ns);
   b.tick();
   CHECK(b.scanner.triggers.size() == 2);
+}
+
+TEST_CASE(
+    "an arm in place waits with its exposure until the sums that the surface before has left are cleared") {
+  using Stage = SurfaceTask::Stage;
+  Bench b;
+  const auto edge = rectangle_edge();
+  b.surface.build_outline(edge, rectangle);
+  for (int i = 0; i < 100'000 && !b.surface.outline_ready(); ++i) b.surface.step(0ns);
+  REQUIRE(b.surface.stage() == Stage::clearing);
+  b.tick();
+  b.arrive();
+  int steps = 0;
+  for (; steps < 100'000 && b.surface.stage() != Stage::open; ++steps) {
+    b.tick();
+    REQUIRE(b.scanner.triggers.empty());
+    b.surface.step(0ns);
+  }
+  REQUIRE(b.surface.stage() == Stage::open);
+  CHECK(steps > 2);  // clearing and folding take several
+  b.tick();
+  CHECK(b.scanner.triggers.size() == 1);
 }
