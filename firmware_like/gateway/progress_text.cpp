@@ -80,6 +80,17 @@ std::string both_awaited(const tasks::CellProgress& p, const Surroundings& aroun
                      awaited_device("scanner", around.scanner, p.awaited_why));
 }
 
+// What is waited for, beside the cell's reason to stand where that has been told. A device that was lost is waited for
+// in that reason's own words; what it has come to since is news only where it is something else.
+std::string awaited_beside(std::string_view reason, const tasks::CellProgress& p,
+                           const Surroundings& around) {
+  if (reason.empty() || p.cause != tasks::HoldCause::scanner || p.awaited != Awaited::scanner)
+    return awaited_text(p, around);
+  const std::string_view lost_for = reason.substr(0, reason.rfind("; "));
+  const bool is_news = !p.awaited_why.empty() && !p.awaited_why.view().starts_with(lost_for);
+  return is_news ? fmt::format("now: {}", p.awaited_why.view()) : "";
+}
+
 std::size_t columns_of(std::string_view text) {
   std::size_t count = 0;
   for (const char c : text) count += (static_cast<unsigned char>(c) & 0xC0u) != 0x80u ? 1 : 0;
@@ -131,14 +142,16 @@ std::string progress_line(const tasks::CellProgress& p, const Surroundings& arou
   line += fmt::format("  boundary shots {:>3}", p.boundary_shots);
   if (p.surface_planned > 0) line += fmt::format("  surface {:>3}/{}", p.surface_shots, p.surface_planned);
   if (p.retaken > 0) line += fmt::format("  retaken {}", p.retaken);
-  for (const auto& part : {left_text(p), held_up_by(p), awaited_text(p, around)})
+  const std::string held_up = held_up_by(p);
+  for (const auto& part : {left_text(p), held_up, awaited_beside(held_up, p, around)})
     if (!part.empty()) line += "  " + part;
   return line;
 }
 
 std::string progress_line_within(std::size_t columns, const tasks::CellProgress& p,
                                  const Surroundings& around) {
-  const std::string left = left_text(p), held_up = held_up_by(p), awaited = awaited_text(p, around);
+  const std::string left = left_text(p), held_up = held_up_by(p);
+  const std::string awaited = awaited_beside(held_up, p, around);
   const std::string shots = p.surface_planned > 0
                                 ? fmt::format("surface {}/{}", p.surface_shots, p.surface_planned)
                             : p.boundary_shots > 0 ? fmt::format("edge {}", p.boundary_shots)
@@ -151,12 +164,13 @@ std::string progress_line_within(std::size_t columns, const tasks::CellProgress&
   };
   // What is waited for comes before what is left, which comes before the shots.
   const std::string_view waits = awaited_short(p, around);
-  const std::array<std::string, 6> shorter = {progress_line(p, around),
-                                              joined({state_text(p), shots, left, held_up, awaited}),
-                                              joined({short_state(p), shots, left, held_up, waits}),
-                                              joined({short_state(p), shots, left, waits}),
-                                              joined({short_state(p), left, waits}),
-                                              joined({short_state(p), waits.empty() ? left : waits})};
+  const std::array<std::string, 6> shorter = {
+      progress_line(p, around),
+      joined({state_text(p), shots, left, held_up, awaited}),
+      joined({short_state(p), shots, left, held_up.empty() ? waits : held_up}),
+      joined({short_state(p), shots, left, waits}),
+      joined({short_state(p), left, waits}),
+      joined({short_state(p), waits.empty() ? left : waits})};
   for (const auto& line : shorter)
     if (columns_of(line) <= columns) return line;
   return cut_to(columns, shorter.back());
@@ -168,9 +182,11 @@ std::string status_line(const tasks::CellProgress& p, const Surroundings& around
   if (p.surface_planned > 0)
     line += fmt::format(", {} of {} surface shots", p.surface_shots, p.surface_planned);
   // After a stop the reason of a hold before it is history.
-  if (!p.why.empty() && p.state != tasks::CellState::stopping && p.state != tasks::CellState::stopped)
-    line += fmt::format(": {}", p.why.view());
-  if (const auto awaited = awaited_text(p, around); !awaited.empty()) line += fmt::format("; {}", awaited);
+  const bool is_history = p.state == tasks::CellState::stopping || p.state == tasks::CellState::stopped;
+  const std::string_view reason = is_history ? std::string_view{} : p.why.view();
+  if (!reason.empty()) line += fmt::format(": {}", reason);
+  if (const auto awaited = awaited_beside(reason, p, around); !awaited.empty())
+    line += fmt::format("; {}", awaited);
   return line;
 }
 
