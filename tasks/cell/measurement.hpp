@@ -40,6 +40,7 @@ class Measurement final : public ShotUser {
   void step() MOLDLOFT_NONBLOCKING;      // once a tick in Execute; says done when the surface is there
   void use_view() MOLDLOFT_NONBLOCKING;  // once a tick in any state: of a whole frame that has been looked at
   void spend(hal::Duration in_execute) MOLDLOFT_NONBLOCKING { spent_ += in_execute; }
+  void frame_is_lost() MOLDLOFT_NONBLOCKING;  // the one that arrives will not become whole
   void forget() MOLDLOFT_NONBLOCKING;
 
   // ---- ShotUser
@@ -47,9 +48,7 @@ class Measurement final : public ShotUser {
   void frame_comes(const ShotOrder&, const hal::Frame&, hal::Scanner* unpacks) MOLDLOFT_NONBLOCKING override;
   void frame_is_whole(const ShotOrder&, const hal::Frame&, hal::Scanner* unpacks,
                       bool of_earlier_run) MOLDLOFT_NONBLOCKING override;
-  void frame_is_lost() MOLDLOFT_NONBLOCKING override;
   void arm_is_free() MOLDLOFT_NONBLOCKING override;
-  void order_next() MOLDLOFT_NONBLOCKING override;
   bool visit_again(const ShotPlace&) MOLDLOFT_NONBLOCKING override;
 
   // ---- where it stands
@@ -82,6 +81,7 @@ class Measurement final : public ShotUser {
   void build_outline() MOLDLOFT_NONBLOCKING;
   void plan_zigzag() MOLDLOFT_NONBLOCKING;
   void scan() MOLDLOFT_NONBLOCKING;
+  void order_next() MOLDLOFT_NONBLOCKING;
   void hold_for_flaw(HoldCause) MOLDLOFT_NONBLOCKING;
   void use_shot(FrameLease) MOLDLOFT_NONBLOCKING;
   std::optional<double> learn_heights(const geometry::RigidMotion& world_from_scanner) MOLDLOFT_NONBLOCKING;

@@ -204,7 +204,7 @@ void ShotTaker::on_failure(const hal::Message& text) {
   if (again.purpose == ShotPurpose::surface) {
     if (!user_.visit_again(again.place)) return supervisor_.hold(HoldCause::person, text);
     ++retaken_;
-    if (is_done()) user_.order_next();
+    if (is_done()) user_.arm_is_free();
   } else {
     // A new id: the arm may have moved, and the scanner must not answer with what it exposed elsewhere.
     ++epoch_;
@@ -256,7 +256,7 @@ void ShotTaker::skip_given_up() {
          user_.visit_again(ordered_->place)) {
     ++retaken_;
     ordered_.reset();
-    user_.order_next();
+    user_.arm_is_free();
   }
 }
 

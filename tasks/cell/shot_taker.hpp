@@ -42,15 +42,13 @@ class ShotUser {
  public:
   // Nobody reads the frame before, and there is room for what the next one brings.
   virtual bool takes_frame() const MOLDLOFT_NONBLOCKING = 0;
-  // A frame, whole or still arriving; `unpacks` holds the points that are not there yet. It becomes whole, or is lost.
+  // A frame that still arrives; `unpacks` holds the points that are not there yet. It becomes whole, or is lost.
   virtual void frame_comes(const ShotOrder&, const hal::Frame&,
                            hal::Scanner* unpacks) MOLDLOFT_NONBLOCKING = 0;
   virtual void frame_is_whole(const ShotOrder&, const hal::Frame&, hal::Scanner* unpacks,
                               bool of_earlier_run) MOLDLOFT_NONBLOCKING = 0;
-  virtual void frame_is_lost() MOLDLOFT_NONBLOCKING = 0;
-  // The arm may go on: orders the next shot where that is known already.
+  // The next shot may be ordered: the arm is free. Where only a frame can tell which, the order comes after the frame.
   virtual void arm_is_free() MOLDLOFT_NONBLOCKING = 0;
-  virtual void order_next() MOLDLOFT_NONBLOCKING = 0;
   // A place of the surface whose shot was given up, to be visited once more at the end; false without room for it.
   virtual bool visit_again(const ShotPlace&) MOLDLOFT_NONBLOCKING = 0;
 

@@ -51,9 +51,7 @@ struct Bench final : CellActions, ShotUser {
   bool takes_frame() const override { return true; }
   void frame_comes(const ShotOrder&, const hal::Frame&, hal::Scanner*) override {}
   void frame_is_whole(const ShotOrder&, const hal::Frame&, hal::Scanner*, bool) override {}
-  void frame_is_lost() override {}
   void arm_is_free() override {}
-  void order_next() override {}
   bool visit_again(const ShotPlace&) override { return false; }
 
   void order(double x, double yaw = 0) {
