@@ -184,9 +184,14 @@ RunConditions run_beside_threads(Controller& controller, const CellConfig& confi
 }
 
 // Under the journal, for whoever watches it: on a terminal and in the report the timing says the same.
-void warn_of_missed_ticks(const RunResult& result) {
-  const std::string line = missed_ticks_line(result.timing);
-  if (stderr_is_journal() && !line.empty()) complain(line, "moldloft", Priority::warning);
+void warn_of_health(const RunResult& result) {
+  if (!stderr_is_journal()) return;
+  const std::string missed = missed_ticks_line(result.timing), lost = losses_line(result.timing);
+  if (!missed.empty()) complain(missed, "moldloft", Priority::warning);
+  if (!lost.empty())
+    complain(
+        fmt::format("lost on the way: {}: look at cables, earthing and how fast the devices answer", lost),
+        "moldloft", Priority::warning);
 }
 
 // What is left behind and said when the cell has come to rest.
@@ -197,7 +202,7 @@ int wind_up(Controller& controller, RunFolder folder, const RunOptions& options,
       {.plate = folder.names.plate, .seed = {}, .begun = begun_of(folder), .remark = folder.names.remark},
       &conditions);
   const int code = exit_code(result.outcome);
-  warn_of_missed_ticks(result);
+  warn_of_health(result);
   if (!resumed && !controller.cell().has_driven()) {
     discard_run(std::move(folder));
     return complain(why_refused(controller), "moldloft", priority_of(code)),

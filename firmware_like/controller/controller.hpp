@@ -57,6 +57,9 @@ class Controller final : public Stoppable {
   hal::Recorder& recorder() { return recorder_; }
   const hal::Recorder& recorder() const { return recorder_; }
   hal::FlightRecorder& flight() { return flight_; }
+  const hal::FlightRecorder& flight() const { return flight_; }
+  const hal::Scanner& scanner() const { return *scanner_; }
+  const hal::Robot& robot() const { return *robot_; }
   MemoryPlan memory() const;
 
  private:

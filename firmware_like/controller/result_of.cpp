@@ -40,6 +40,10 @@ CycleShares shares_of(const tasks::CycleTimes& cycle) {
           .standing_fraction = seconds(cycle.standing) / total};
 }
 
+std::vector<NamedLosses> losses_of(const Controller& c) {
+  return {{"scanner", c.scanner().losses()}, {"robot", c.robot().losses()}};
+}
+
 }  // namespace
 
 Outcome outcome_of(const Controller& c) {
@@ -77,7 +81,11 @@ RunResult result_of(const Controller& c, const RunLabel& label, const RunConditi
   r.cycle = shares_of(cell.cycle());
   r.memory = c.memory();
   r.recorder_lost = c.recorder().lost();
-  r.timing = timing_report({.scheduler = c.scheduler(), .cell = &cell, .conditions = conditions});
+  r.timing = timing_report({.scheduler = c.scheduler(),
+                            .cell = &cell,
+                            .conditions = conditions,
+                            .losses = losses_of(c),
+                            .dumps_too_soon = c.flight().later_triggers()});
   return r;
 }
 

@@ -324,6 +324,23 @@ std::string budgets(const Json& t) {
             "budgets"));
 }
 
+std::string losses(const Json& t) {
+  if (!t.contains("losses")) return "";
+  std::string rows;
+  for (const auto& loss : t.at("losses")) {
+    const bool any = loss.at("count").get<std::uint64_t>() > 0;
+    rows += row({{figure(loss, "of"), "word"},
+                 {figure(loss, "what"), "word"},
+                 {figure(loss, "count"), any ? "bad" : ""}});
+  }
+  std::string lead =
+      "Counted since the program's start. All of it was asked for again: the result lacks nothing. "
+      "Garbled lines and broken streams point to a cable or its earthing.";
+  if (const auto left_out = t.value("dumps_too_soon", std::uint64_t{0}); left_out > 0)
+    lead += fmt::format(" Dumps of the flight recorder left out, too soon after another: {}.", left_out);
+  return section("Lost on the way", lead, table({{"whose", "word"}, {"what", "word"}, {"count"}}, rows));
+}
+
 // What the operating system did to the control thread after its first ticks.
 std::string control_thread(const Json& t) {
   if (!t.contains("control_thread")) return "";
@@ -391,7 +408,8 @@ std::string timing_page(const Json& t, std::string_view title, std::string_view 
       plot_of(t, "frame_to_command", "From frame to command",
               "From the last byte of a frame read to the command that it decided handed to the robot's link.",
               "frame to command", 100ns);
-  html += distributions(t) + misses(t) + tasks_section(t) + budgets(t) + control_thread(t) + machine(t);
+  html += distributions(t) + misses(t) + tasks_section(t) + budgets(t) + losses(t) + control_thread(t) +
+          machine(t);
   return html + "</main>\n</body>\n</html>\n";
 }
 

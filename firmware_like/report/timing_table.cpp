@@ -149,6 +149,16 @@ std::string system_counts(const Json& t) {
                           number(c, "involuntary_switches"), number(c, "migrations"), number(c, "ticks")));
 }
 
+std::string losses(const Json& t) {
+  if (!t.contains("losses")) return "";
+  const std::string lost = losses_line(t);
+  std::string s = line("lost on the way", name_width, lost.empty() ? "nothing" : lost);
+  if (const auto left_out = number(t, "dumps_too_soon"); left_out > 0)
+    s += line("flight recorder", name_width,
+              fmt::format("dumps left out, too soon after another: {}", left_out));
+  return s;
+}
+
 std::string verdict(const Json& t) {
   const bool yes = t.contains("representative") && t.at("representative").get<bool>();
   return yes ? std::string{"yes"} : "NO: " + text(t, "why");
@@ -169,8 +179,8 @@ std::string comparison(const Json& t) {
 std::string timing_table(const Json& t) {
   return comparison(t) + histograms(t) + "\n" + line("missed ticks", name_width, missed(t)) +
          first_misses(t) + line("latest wake-up", name_width, latest_wake_up(t)) +
-         line("load", name_width, load(t)) + system_counts(t) + "\n" + task_counts(t) + "\n" + budgets(t) +
-         "\n" + line("representative", name_width, in_lines(verdict(t), name_width));
+         line("load", name_width, load(t)) + system_counts(t) + losses(t) + "\n" + task_counts(t) + "\n" +
+         budgets(t) + "\n" + line("representative", name_width, in_lines(verdict(t), name_width));
 }
 
 std::string timing_lines(const Json& t) {
@@ -180,7 +190,9 @@ std::string timing_lines(const Json& t) {
     s += line("wake-up latency, us", result_width,
               fmt::format("p50 {}, p99 {}, p99.9 {}, max {}", figure(w.at("p50_us")), figure(w.at("p99_us")),
                           figure(w.at("p999_us")), figure(w.at("max_us"))));
+  const std::string lost = losses_line(t);
   return s + line("missed ticks", result_width, missed(t)) + line("load", result_width, load(t)) +
+         (lost.empty() ? "" : line("lost on the way", result_width, lost)) +
          line("timing representative", result_width, verdict(t));
 }
 
@@ -196,6 +208,19 @@ std::string missed_ticks_line(const Json& t) {
   const Json& first = t.at("first_misses").front();
   s += fmt::format("; the first at {} s, {} us late", moment_s(first, "t_ms"), figure(first.at("late_us")));
   if (const std::string task = text(first, "task"); task != "none") s += fmt::format(", after '{}'", task);
+  return s;
+}
+
+std::string losses_line(const Json& t) {
+  if (!t.contains("losses")) return "";
+  std::string s, of;
+  for (const auto& loss : t.at("losses")) {
+    if (number(loss, "count") == 0) continue;
+    const std::string whose = text(loss, "of");
+    s += whose == of ? ", " : fmt::format("{}{}: ", s.empty() ? "" : "; ", whose);
+    s += fmt::format("{} {}", text(loss, "what"), number(loss, "count"));
+    of = whose;
+  }
   return s;
 }
 

@@ -141,6 +141,17 @@ void put_scanner_clock(Json& j, const tasks::Cell& cell) {
                         {"readings", drift->pairs}};
 }
 
+// All counts, the zeros too: a reader sees what is watched.
+void put_losses(Json& j, const TimedRun& run) {
+  if (run.losses.empty()) return;
+  j["losses"] = Json::array();
+  for (const auto& [of, counts] : run.losses) {
+    for (const auto& [what, count] : counts)
+      j["losses"].push_back({{"of", std::string{of}}, {"what", std::string{what}}, {"count", count}});
+  }
+  j["dumps_too_soon"] = run.dumps_too_soon;
+}
+
 void put_tasks(Json& j, const tasks::Scheduler& s) {
   j["tasks"] = Json::array();
   for (const auto& t : s.tasks()) {
@@ -233,6 +244,7 @@ Json timing_report(const TimedRun& run) {
   j["frame_to_command"] = run.cell == nullptr ? Json(nullptr) : histogram_json(run.cell->frame_to_command());
   j["data_age"] = run.cell == nullptr ? Json(nullptr) : histogram_json(run.cell->data_age());
   if (run.cell != nullptr) put_scanner_clock(j, *run.cell);
+  put_losses(j, run);
   put_load(j, s);
   put_tasks(j, s);
   put_budgets(j, s, j["representative"].get<bool>());

@@ -12,19 +12,30 @@
 #pragma once
 
 #include "firmware_like/results/environment_report.hpp"
+#include "hal/base/loss_count.hpp"
 #include "tasks/cell/cell.hpp"
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace moldloft::firmware_like {
+
+// What was lost of one device's words.
+struct NamedLosses {
+  std::string_view of;  // "scanner", "robot"
+  hal::LossCounts counts;
+};
 
 struct TimedRun {
   const tasks::Scheduler& scheduler;
   const tasks::Cell* cell = nullptr;          // null: without devices nothing is measured from end to end
   const RunConditions* conditions = nullptr;  // null: virtual time
+  std::vector<NamedLosses> losses = {};       // none: nothing counts any
+  std::uint64_t dumps_too_soon = 0;  // of the flight recorder, left out because another had just been made
 };
 Json timing_report(const TimedRun&);
 

@@ -490,4 +490,10 @@ bool LineRobot::send(std::string_view line, Instant now) {
   return true;
 }
 
+LossCounts LineRobot::losses() const {
+  return {{"garbled lines", garbled_lines_},
+          {"repeated lines", repeated_lines_},
+          {"lost events", events_.dropped()}};
+}
+
 }  // namespace moldloft::hal

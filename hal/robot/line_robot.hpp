@@ -53,11 +53,10 @@ class LineRobot final : public Robot {
   std::optional<RobotEvent> next_event() override { return events_.pop(); }
   RobotState state() const override;
   std::string_view why() const override { return why_; }
+  LossCounts losses() const override;
   std::size_t plan_bytes() const override { return sizeof *this + session_.plan_bytes(); }
 
   robot_line::Status last_status() const { return status_; }
-  std::uint64_t garbled_lines() const { return garbled_lines_; }    // received, and thrown away
-  std::uint64_t repeated_lines() const { return repeated_lines_; }  // sent again because no answer came
 
  private:
   static constexpr std::size_t shown_of_line =
@@ -134,8 +133,9 @@ class LineRobot final : public Robot {
   std::uint64_t unread_ = 0;                 // characters since the last line that could be read
   std::array<char, shown_of_line> shown_{};  // of the last line that could not, its beginning
   std::size_t shown_size_ = 0;
-  robot_line::Flaw flaw_{};  // of that line
-  std::uint64_t garbled_lines_ = 0, repeated_lines_ = 0;
+  robot_line::Flaw flaw_{};           // of that line
+  std::uint64_t garbled_lines_ = 0;   // received, and thrown away
+  std::uint64_t repeated_lines_ = 0;  // sent again because no answer came
 };
 
 }  // namespace moldloft::hal

@@ -10,6 +10,7 @@
 
 #include "hal/base/clock.hpp"
 #include "hal/base/fixed_text.hpp"
+#include "hal/base/loss_count.hpp"
 #include "hal/base/realtime.hpp"
 #include "hal/robot/pose.hpp"
 
@@ -61,6 +62,7 @@ class Robot {
   virtual std::optional<RobotEvent> next_event() MOLDLOFT_NONBLOCKING = 0;
   virtual RobotState state() const MOLDLOFT_NONBLOCKING = 0;
   virtual std::string_view why() const MOLDLOFT_NONBLOCKING = 0;
+  virtual LossCounts losses() const { return {}; }                  // what the driver counts, all zeros too
   virtual std::size_t plan_bytes() const MOLDLOFT_NONBLOCKING = 0;  // memory taken at construction
 };
 

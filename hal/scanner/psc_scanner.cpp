@@ -549,4 +549,10 @@ void PscScanner::broken(Instant now, std::string_view what, Flaw flaw) {
   lose(now, Message::format("{} from the scanner: {}", what, to_string(flaw)));
 }
 
+LossCounts PscScanner::losses() const {
+  return {{"broken streams", broken_streams_},
+          {"stale frames", stale_frames_},
+          {"lost events", events_.dropped()}};
+}
+
 }  // namespace moldloft::hal

@@ -65,14 +65,9 @@ class PscScanner final : public Scanner {
   std::uint64_t frame_offset() const override { return frame_offset_; }
   std::uint32_t frame_bytes() const override { return frame_bytes_; }
   std::string_view why() const override { return why_; }
+  LossCounts losses() const override;
 
   int attempts() const { return shot_.attempts; }  // TRIGGERs sent for the last shot
-  std::uint64_t stale_frames() const {
-    return stale_frames_;
-  }  // whole and valid, but of another shot or session
-  std::uint64_t broken_streams() const {
-    return broken_streams_;
-  }  // connections dropped for bytes that were wrong
   std::size_t plan_bytes() const override;
 
  private:
@@ -159,7 +154,8 @@ class PscScanner final : public Scanner {
   std::size_t unpacked_ = 0;               // points that are in frame_
   std::uint64_t frame_offset_ = 0;
   std::uint32_t frame_bytes_ = 0;
-  std::uint64_t stale_frames_ = 0, broken_streams_ = 0;
+  std::uint64_t stale_frames_ = 0;    // whole and valid, but of another shot or session
+  std::uint64_t broken_streams_ = 0;  // connections dropped for bytes that were wrong
   Message why_ = "not started yet";
   Message failure_;  // why the last attempt of the shot failed
 };

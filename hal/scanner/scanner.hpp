@@ -10,6 +10,7 @@
 
 #include "hal/base/clock.hpp"
 #include "hal/base/fixed_text.hpp"
+#include "hal/base/loss_count.hpp"
 #include "hal/base/realtime.hpp"
 #include "hal/scanner/frame.hpp"
 
@@ -79,7 +80,8 @@ class Scanner {
       MOLDLOFT_NONBLOCKING = 0;  // where its payload began in all bytes ever received on this link
   virtual std::uint32_t frame_bytes() const MOLDLOFT_NONBLOCKING = 0;  // the payload's size
   virtual std::string_view why() const MOLDLOFT_NONBLOCKING = 0;       // the last reason for being offline
-  virtual std::size_t plan_bytes() const MOLDLOFT_NONBLOCKING = 0;     // memory taken at construction
+  virtual LossCounts losses() const { return {}; }                  // what the driver counts, all zeros too
+  virtual std::size_t plan_bytes() const MOLDLOFT_NONBLOCKING = 0;  // memory taken at construction
 };
 
 }  // namespace moldloft::hal

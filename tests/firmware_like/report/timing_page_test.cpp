@@ -222,6 +222,39 @@ TEST_CASE(
   CHECK(said().find("No frame has led to a command in this run.") != std::string::npos);
 }
 
+TEST_CASE(
+    "what was lost on the way stands on the page, in the table, and at a run's end where there is any") {
+  const auto with = [](std::uint64_t garbled, std::uint64_t repeated, std::uint64_t broken) {
+    Json t = report();
+    t["losses"] = Json::array({{{"of", "scanner"}, {"what", "broken streams"}, {"count", broken}},
+                               {{"of", "robot"}, {"what", "garbled lines"}, {"count", garbled}},
+                               {{"of", "robot"}, {"what", "repeated lines"}, {"count", repeated}}});
+    return t;
+  };
+  CHECK(losses_line(with(3, 2, 1)) == "scanner: broken streams 1; robot: garbled lines 3, repeated lines 2");
+  CHECK(losses_line(with(0, 2, 0)) == "robot: repeated lines 2");
+  CHECK(losses_line(with(0, 0, 0)) == "");
+  CHECK(losses_line(report()) == "");  // a report that does not count them
+  CHECK(timing_table(with(3, 0, 0)).find("lost on the way     robot: garbled lines 3\n") !=
+        std::string::npos);
+  CHECK(timing_table(with(0, 0, 0)).find("lost on the way     nothing\n") != std::string::npos);
+  CHECK(timing_table(report()).find("lost") == timing_table(report()).find("lost  cause"));
+  CHECK(timing_lines(with(3, 0, 0)).find("lost on the way             robot: garbled lines 3\n") !=
+        std::string::npos);
+  CHECK(timing_lines(with(0, 0, 0)) == timing_lines(report()));
+  const std::string page = timing_page(with(3, 0, 0), "t", "");
+  CHECK(flaw_of(page) == "");
+  CHECK(page.find("<td class=\"word\">garbled lines</td><td class=\"bad\">3</td>") != std::string::npos);
+  CHECK(page.find("<td class=\"word\">broken streams</td><td>0</td>") != std::string::npos);
+  Json crowded = with(0, 0, 0);
+  crowded["dumps_too_soon"] = 4;
+  CHECK(timing_table(crowded).find("flight recorder     dumps left out, too soon after another: 4\n") !=
+        std::string::npos);
+  CHECK(timing_page(crowded, "t", "").find("too soon after another: 4.") != std::string::npos);
+  CHECK(timing_table(with(0, 0, 0)).find("flight recorder") == std::string::npos);
+  CHECK(timing_page(report(), "t", "").find("Lost on the way") == std::string::npos);
+}
+
 TEST_CASE("the page fits a telephone of 400 px and a sheet of A4, and no digit is cut off") {
   const std::string page = timing_page(report(), "run");
   // Narrow: drawings of their own, 376 px wide so that 12 px letters are 12 px; tables keep their most telling columns.

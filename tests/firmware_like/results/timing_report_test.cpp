@@ -253,6 +253,18 @@ TEST_CASE("the lateness of a task is what the budgets before it do not explain")
   CHECK(t["tasks"][0]["lateness_us"] == 0.0);
 }
 
+TEST_CASE("what drivers count as lost stands in the report, the zeros too") {
+  Bench bench{always(200us)};
+  const Json t = timing_report({.scheduler = bench.scheduler,
+                                .losses = {{"scanner", {{"stale frames", 0}}},
+                                           {"robot", {{"garbled lines", 7}, {"repeated lines", 2}}}}});
+  REQUIRE(t["losses"].size() == 3);
+  CHECK(t["losses"][0] == Json{{"of", "scanner"}, {"what", "stale frames"}, {"count", 0}});
+  CHECK(t["losses"][1] == Json{{"of", "robot"}, {"what", "garbled lines"}, {"count", 7}});
+  CHECK(t["losses"][2] == Json{{"of", "robot"}, {"what", "repeated lines"}, {"count", 2}});
+  CHECK_FALSE(timing_report({.scheduler = bench.scheduler}).contains("losses"));
+}
+
 TEST_CASE("the report of a run has every part") {
   Bench bench{always(200us), 10};
   const Json t = bench.run(50ms);

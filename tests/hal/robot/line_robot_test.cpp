@@ -1,6 +1,7 @@
 #include "hal/robot/line_robot.hpp"
 
 #include "hal/driver_bench.hpp"
+#include "hal/loss_of.hpp"
 #include "hal/robot_peer.hpp"
 
 #include <doctest/doctest.h>
@@ -48,7 +49,7 @@ TEST_CASE("a motion: ACK, DON, and the pose is the one that was read back") {
   CHECK(cell.robot.state() == RobotState::ready);
   CHECK(cell.peer.motions == 1);
   CHECK(cell.peer.times_heard("0001 MOV 412.350 -88.120 155.000 0.000 180.000 35.000 50") == 1);
-  CHECK(cell.robot.repeated_lines() == 0);
+  CHECK(loss_of(cell.robot, "repeated lines") == 0);
 }
 
 TEST_CASE("a calibration goes the same way") {
@@ -146,7 +147,7 @@ TEST_CASE("a reply that came garbled is asked for again soon, and counted") {
   };
   REQUIRE(cell.robot.move(there, 50, cell.clock.now()));
   REQUIRE(cell.run_until(Kind::done, 300ms));  // 200 ms of motion and the repeat
-  CHECK(cell.robot.garbled_lines() == 1);
+  CHECK(loss_of(cell.robot, "garbled lines") == 1);
   CHECK(cell.peer.motions == 1);
 }
 
@@ -455,7 +456,7 @@ TEST_CASE("noise without end, lines without end: the driver keeps its bearings")
   cell.peer.send(noise + std::string(500, 'y') + "\n");
   cell.run(1s);
   CHECK(cell.robot.state() == RobotState::ready);
-  CHECK(cell.robot.garbled_lines() > 0);
+  CHECK(loss_of(cell.robot, "garbled lines") > 0);
   REQUIRE(cell.robot.move(there, 50, cell.clock.now()));
   REQUIRE(cell.run_until(Kind::done));
 }

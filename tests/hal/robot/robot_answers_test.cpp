@@ -1,5 +1,6 @@
 // A robot program that somebody has written from PROTOCOLS.md and got one thing wrong: what the driver says names it.
 #include "hal/driver_bench.hpp"
+#include "hal/loss_of.hpp"
 #include "hal/robot/line_robot.hpp"
 #include "hal/robot_peer.hpp"
 
@@ -201,12 +202,12 @@ TEST_CASE("a line of 120 characters is read, one of 121 is not, and CR and empty
     return true;
   };
   cell.start();
-  CHECK(cell.robot.garbled_lines() == 0);
+  CHECK(loss_of(cell.robot, "garbled lines") == 0);
   cell.peer.send("<" + std::string(120, 'x') + "\n");
   cell.run(50ms);
-  CHECK(cell.robot.garbled_lines() == 1);
+  CHECK(loss_of(cell.robot, "garbled lines") == 1);
   cell.peer.send("<0000 PNG\0 *1\n"s);
   cell.run(50ms);
-  CHECK(cell.robot.garbled_lines() == 2);
+  CHECK(loss_of(cell.robot, "garbled lines") == 2);
   CHECK(cell.robot.state() == RobotState::ready);
 }

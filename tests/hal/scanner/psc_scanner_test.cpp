@@ -2,6 +2,7 @@
 
 #include "hal/base/crc32c.hpp"
 #include "hal/driver_bench.hpp"
+#include "hal/loss_of.hpp"
 #include "hal/scanner_peer.hpp"
 
 #include <doctest/doctest.h>
@@ -149,7 +150,7 @@ TEST_CASE("the driver unpacks by itself where nobody asks, and reads no byte ove
   REQUIRE(cell.run_until(Kind::frame));
   CHECK(cell.scanner.frame().shot_id == 4);
   CHECK(same_points(cell.frame(), through_the_wire(sample_frame(10, 50, 4, 1000))));
-  CHECK(cell.scanner.broken_streams() == 0);
+  CHECK(loss_of(cell.scanner, "broken streams") == 0);
 }
 
 TEST_CASE("a frame can be looked at while it arrives: its points are there before its last byte") {
@@ -214,12 +215,12 @@ TEST_CASE("a frame that comes in one piece is not announced first, one that nobo
   slow.peer.send_frame(4, 1000);  // another shot's
   slow.peer.send_frame(5, 999);   // another session's
   REQUIRE(slow.run_until(Kind::arriving));
-  CHECK(slow.scanner.stale_frames() == 2);
+  CHECK(loss_of(slow.scanner, "stale frames") == 2);
   slow.scanner.forget_shot();
   CHECK(slow.scanner.packed() == 0);
   REQUIRE(slow.scanner.trigger(6, slow.clock.now()));
   REQUIRE(slow.run_until(Kind::frame));
-  CHECK(slow.scanner.stale_frames() == 3);
+  CHECK(loss_of(slow.scanner, "stale frames") == 3);
   CHECK(slow.count(Kind::arriving) == 2);
   CHECK(slow.scanner.frame().shot_id == 6);
   CHECK(same_points(slow.frame(), through_the_wire(sample_frame(10, 50, 6, 1000))));
@@ -236,7 +237,7 @@ TEST_CASE("a stream in pieces of any size gives the same frame") {
       REQUIRE(cell.scanner.trigger(3, cell.clock.now()));
       REQUIRE(cell.run_until(Kind::frame));
       CHECK(same_points(cell.frame(), truth));
-      CHECK(cell.scanner.broken_streams() == 0);
+      CHECK(loss_of(cell.scanner, "broken streams") == 0);
     }
   }
 }
@@ -261,7 +262,7 @@ TEST_CASE("a frame with a wrong CRC drops the connection, the same shot comes ag
     cell.peer.on_send = damage_first(1, psc1::Type::frame, at);
     REQUIRE(cell.scanner.trigger(5, cell.clock.now()));
     REQUIRE(cell.run_until(Kind::frame));
-    CHECK(cell.scanner.broken_streams() == 1);
+    CHECK(loss_of(cell.scanner, "broken streams") == 1);
     CHECK(cell.peer.exposures == 1);
     CHECK(cell.peer.hellos == 2);
     CHECK(cell.peer.configs == 2);
@@ -330,7 +331,7 @@ TEST_CASE("frames of another shot, of another session, or come twice are dropped
   cell.peer.send_frame(5, 1000);
   cell.run(1s);
   CHECK(cell.count(Kind::frame) == 1);
-  CHECK(cell.scanner.stale_frames() == 4);
+  CHECK(loss_of(cell.scanner, "stale frames") == 4);
   CHECK(cell.scanner.frame_offset() == offset);
   CHECK(cell.scanner.frame().shot_id == 5);
 }
@@ -489,7 +490,7 @@ TEST_CASE("whatever bytes arrive, the driver stays in its table and comes back")
     cell.run(20ms);
   }
   cell.run(10s);
-  CHECK(cell.scanner.broken_streams() > 20);
+  CHECK(loss_of(cell.scanner, "broken streams") > 20);
   CHECK(cell.scanner.state() == ScannerState::ready);
   REQUIRE(cell.scanner.trigger(5, cell.clock.now()));
   REQUIRE(cell.run_until(Kind::frame));

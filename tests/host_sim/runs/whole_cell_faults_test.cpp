@@ -7,6 +7,9 @@
 
 #include <doctest/doctest.h>
 
+#include <span>
+#include <string_view>
+
 using namespace moldloft;
 using namespace moldloft::host_sim;
 using namespace std::chrono_literals;
@@ -143,6 +146,27 @@ TEST_CASE(
   CHECK(refused.exit_code == firmware_like::exit_aborted);
   CHECK(message(refused) == "scanner: the cable is cut");
   CHECK_FALSE(std::filesystem::exists(stays_away.folder()));  // nothing was measured: nothing stays behind
+}
+
+TEST_CASE("lines that come garbled from the robot stop no run, and its timing says how many there were") {
+  ScriptedRun cell;
+  Once garbles;
+  const auto run = cell.run([&](const SimulatedCell& c, hal::Instant now) {
+    if (!garbles.begins(boundary_shots(c) == 3 && moves(c, now), now)) return;
+    for (const std::string_view line : {"<0000 PNG *1\n", "\x80\xFE\n", "<0001 DON 1.0\n"})
+      c.robot_cable.device().write(std::as_bytes(std::span{line}));
+  });
+  CHECK(garbles.happened());
+  CHECK(run.exit_code == firmware_like::exit_done);
+  check_truth(run.summary);
+  const auto timing = firmware_like::Json::parse(cell.file("timing.json"));
+  int garbled = 0, of_scanner = 0;
+  for (const auto& loss : timing["losses"]) {
+    if (loss["what"] == "garbled lines") garbled += loss["count"].get<int>();
+    if (loss["of"] == "scanner") of_scanner += loss["count"].get<int>();
+  }
+  CHECK(garbled == 3);
+  CHECK(of_scanner == 0);
 }
 
 TEST_CASE("scanner power cycle in mid-frame: the shot is taken again and the run completes") {

@@ -45,6 +45,8 @@ TEST_CASE("the default run completes, and its summary says everything that it pr
   CHECK(timing["frame_to_command"]["count"] ==
         s["shots"]["seek"].get<int>() + s["shots"]["boundary"].get<int>() - 1);
   CHECK(timing["frame_to_command"]["max_us"] == 0);
+  REQUIRE(timing["losses"].size() == 6);
+  for (const auto& loss : timing["losses"]) CHECK_MESSAGE(loss["count"] == 0, loss.dump());
   // Of cell time: a step of the fit is charged its whole quantum, whatever the machine.
   CHECK(s["surface"]["ready_after_last_frame_ms"].get<double>() <= 50);
   CHECK(s["cycle"]["idle_fraction"].get<double>() >= 0);
