@@ -171,7 +171,10 @@ RunConditions run_beside_threads(Controller& controller, const CellConfig& confi
   const Surroundings around{.scanner = place_of(config.scanner.place),
                             .robot = place_of(config.robot.place),
                             .has_operator = operator_socket != nullptr};
-  service.emplace(controller.cell(), controller.scheduler(), folder.path, around);
+  const auto look_at_loop = [&scheduler = controller.scheduler()] {
+    return LoopPulse{.ticks = scheduler.heartbeat(), .task = scheduler.name_of(scheduler.running_task())};
+  };
+  service.emplace(controller.cell(), look_at_loop, folder.path, around);
   conditions.setup = process.rows();
   std::ranges::copy(control.setup(), std::back_inserter(conditions.setup));
   conditions.setup.push_back(check_ordinary_threads(control.id(), config.realtime));

@@ -34,7 +34,7 @@ std::size_t terminal_columns(int file, const char* columns) {
   return columns != nullptr && read_number(columns, sensible, told) ? told : 80;
 }
 
-DisplayThread::DisplayThread(const tasks::Cell& cell, std::string head, Surroundings around)
+DisplayThread::DisplayThread(const tasks::CellPort& cell, std::string head, Surroundings around)
     : cell_{cell},
       terminal_{renews_lines(STDERR_FILENO, std::getenv("TERM"))},
       head_{std::move(head)},

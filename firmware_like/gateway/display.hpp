@@ -6,7 +6,7 @@
 
 #include "firmware_like/gateway/progress_text.hpp"
 #include "hal/base/clock.hpp"
-#include "tasks/cell/cell.hpp"
+#include "tasks/progress/cell_port.hpp"
 
 #include <atomic>
 #include <cstddef>
@@ -23,7 +23,7 @@ std::size_t terminal_columns(int file, const char* columns);
 class DisplayThread {
  public:
   // `head` is printed once, when the cell begins to measure or to wait for an operator.
-  DisplayThread(const tasks::Cell&, std::string head, Surroundings);
+  DisplayThread(const tasks::CellPort&, std::string head, Surroundings);
   ~DisplayThread();
   DisplayThread(const DisplayThread&) = delete;
   DisplayThread& operator=(const DisplayThread&) = delete;
@@ -31,7 +31,7 @@ class DisplayThread {
  private:
   void work();
   void show(const tasks::CellProgress&);
-  const tasks::Cell& cell_;
+  const tasks::CellPort& cell_;
   hal::SteadyClock clock_;
   bool terminal_, begun_ = false;
   std::string head_;

@@ -103,7 +103,8 @@ std::string status_json(const tasks::CellProgress& p) {
            {"left_is_estimate", !p.left_is_planned}});
 }
 
-std::string answer_to(std::string_view word, tasks::Cell& cell, const std::function<void()>& let_time_pass) {
+std::string answer_to(std::string_view word, tasks::CellPort& cell,
+                      const std::function<void()>& let_time_pass) {
   if (word == "status") return status_json(cell.progress());
   const auto event = command_named(word);
   if (!event) return fmt::format("refused: unknown command; known: {}", operator_words());
@@ -172,7 +173,7 @@ void OperatorSocket::serve(hal::Duration wait,
     ::sendto(file_, line.data(), line.size(), MSG_DONTWAIT | MSG_NOSIGNAL, generic(from), from_size);
 }
 
-OperatorThread::OperatorThread(const OperatorSocket& socket, tasks::Cell& cell)
+OperatorThread::OperatorThread(const OperatorSocket& socket, tasks::CellPort& cell)
     : socket_{socket}, cell_{cell}, thread_{[this] { work(); }} {}
 
 OperatorThread::~OperatorThread() {

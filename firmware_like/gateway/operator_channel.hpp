@@ -5,15 +5,14 @@
 //   start hold unhold stop abort clear reset      "done: Held -> Starting", or "refused: ..." and why
 //   status                                        one line of JSON
 //
-// Thread       OperatorThread is an ordinary thread; it reaches the control thread through Cell::command()
-//              and progress() only
+// Thread       OperatorThread is an ordinary thread; it reaches the control thread through CellPort only
 // Blocking     every wait has a limit
 // Failure      one line
 #pragma once
 
 #include "firmware_like/gateway/cell_search.hpp"
 #include "hal/base/clock.hpp"
-#include "tasks/cell/cell.hpp"
+#include "tasks/progress/cell_port.hpp"
 
 #include <atomic>
 #include <expected>
@@ -29,7 +28,7 @@ std::string operator_words();
 
 // What a word is answered with. `let_time_pass` is called, some ten times at most, while the control loop takes
 // the command up.
-std::string answer_to(std::string_view word, tasks::Cell&, const std::function<void()>& let_time_pass);
+std::string answer_to(std::string_view word, tasks::CellPort&, const std::function<void()>& let_time_pass);
 std::string status_json(const tasks::CellProgress&);
 
 class OperatorSocket {
@@ -51,7 +50,7 @@ class OperatorSocket {
 
 class OperatorThread {
  public:
-  OperatorThread(const OperatorSocket&, tasks::Cell&);
+  OperatorThread(const OperatorSocket&, tasks::CellPort&);
   ~OperatorThread();
   OperatorThread(const OperatorThread&) = delete;
   OperatorThread& operator=(const OperatorThread&) = delete;
@@ -59,7 +58,7 @@ class OperatorThread {
  private:
   void work();
   const OperatorSocket& socket_;
-  tasks::Cell& cell_;
+  tasks::CellPort& cell_;
   hal::SteadyClock clock_;
   std::atomic<bool> ending_{false};
   std::thread thread_;

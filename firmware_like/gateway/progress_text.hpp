@@ -2,8 +2,8 @@
 // service manager, what is waited for, and what is noted. Pure functions.
 #pragma once
 
-#include "tasks/cell/cell_progress.hpp"
-#include "tasks/cell/notice.hpp"
+#include "tasks/progress/cell_progress.hpp"
+#include "tasks/progress/notice.hpp"
 
 #include <cstddef>
 #include <string>

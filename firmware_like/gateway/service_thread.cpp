@@ -26,10 +26,10 @@ Priority priority_of(const tasks::Notice& notice) {
 
 }  // namespace
 
-ServiceThread::ServiceThread(tasks::Cell& cell, const tasks::Scheduler& scheduler,
+ServiceThread::ServiceThread(tasks::CellPort& cell, std::function<LoopPulse()> look_at_loop,
                              const std::filesystem::path& run_folder, Surroundings around)
     : cell_{cell},
-      scheduler_{scheduler},
+      look_at_loop_{std::move(look_at_loop)},
       around_{std::move(around)},
       watch_{notify_, run_folder / "watchdog.json"},
       thread_{[this] { work(); }} {}
@@ -41,8 +41,9 @@ ServiceThread::~ServiceThread() {
 
 void ServiceThread::work() {
   while (!leaving_) {
-    watch_.look({.ticks = scheduler_.heartbeat(),
-                 .task = scheduler_.name_of(scheduler_.running_task()),
+    const LoopPulse pulse = look_at_loop_();
+    watch_.look({.ticks = pulse.ticks,
+                 .task = pulse.task,
                  .status = status_line(cell_.progress(), around_),
                  .ended = ended_},
                 clock_.now());

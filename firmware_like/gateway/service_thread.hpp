@@ -4,17 +4,27 @@
 
 #include "firmware_like/gateway/progress_text.hpp"
 #include "firmware_like/gateway/service_watch.hpp"
-#include "tasks/cell/cell.hpp"
+#include "tasks/progress/cell_port.hpp"
 
 #include <atomic>
+#include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <string_view>
 #include <thread>
 
 namespace moldloft::firmware_like {
 
+struct LoopPulse {
+  std::uint64_t ticks = 0;  // the loop's heartbeat
+  std::string_view task;    // that is running now; the name outlives the thread
+};
+
 class ServiceThread {
  public:
-  ServiceThread(tasks::Cell&, const tasks::Scheduler&, const std::filesystem::path& run_folder, Surroundings);
+  // `look_at_loop` is called from the thread.
+  ServiceThread(tasks::CellPort&, std::function<LoopPulse()> look_at_loop,
+                const std::filesystem::path& run_folder, Surroundings);
   ~ServiceThread();
   ServiceThread(const ServiceThread&) = delete;
   ServiceThread& operator=(const ServiceThread&) = delete;
@@ -24,8 +34,8 @@ class ServiceThread {
  private:
   void work();
   void pass_notices_on();
-  tasks::Cell& cell_;
-  const tasks::Scheduler& scheduler_;
+  tasks::CellPort& cell_;
+  const std::function<LoopPulse()> look_at_loop_;
   const Surroundings around_;
   ServiceNotify notify_;
   ServiceWatch watch_;

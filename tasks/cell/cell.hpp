@@ -15,18 +15,17 @@
 #include "hal/robot/robot.hpp"
 #include "hal/scanner/scanner.hpp"
 #include "tasks/cell/arm_gate.hpp"
-#include "tasks/cell/cell_progress.hpp"
 #include "tasks/cell/cell_report.hpp"
 #include "tasks/cell/cell_settings.hpp"
 #include "tasks/cell/cycle_account.hpp"
 #include "tasks/cell/device_start.hpp"
 #include "tasks/cell/disk_wait.hpp"
 #include "tasks/cell/measurement.hpp"
-#include "tasks/cell/notice.hpp"
 #include "tasks/cell/shot_archive.hpp"
 #include "tasks/cell/shot_taker.hpp"
 #include "tasks/cell/supervisor.hpp"
 #include "tasks/machines/cell_state.hpp"
+#include "tasks/progress/cell_port.hpp"
 #include "tasks/scheduler/scheduler.hpp"
 #include "tasks/slices/surface_task.hpp"
 
@@ -37,15 +36,14 @@
 
 namespace moldloft::tasks {
 
-class Cell final : public Task, private CellActions {
+class Cell final : public Task, public CellPort, private CellActions {
  public:
   Cell(const CellSettings&, hal::Scanner&, hal::Robot&, hal::Recorder&, SurfaceTask&,
        const ShotArchive* archive = nullptr);
 
   void run(Instant now) override;
 
-  // An operator's or line controller's command, taken up in the next tick.
-  void command(CellEvent event) { supervisor_.command(event); }
+  void command(CellEvent event) override { supervisor_.command(event); }
   // On the control thread: what is dangerous.
   void abort(const hal::Message& why, HoldCause cause = HoldCause::person) MOLDLOFT_NONBLOCKING {
     supervisor_.abort(why, cause);
@@ -53,13 +51,12 @@ class Cell final : public Task, private CellActions {
   bool waits_for_sending() const MOLDLOFT_NONBLOCKING { return shots_.waits_for_sending(); }
   // On the control thread, when the robot's driver has written what it had.
   void commands_sent(Instant now) MOLDLOFT_NONBLOCKING { shots_.commands_sent(now); }
-  CellProgress progress() const { return report_.progress(); }
+  CellProgress progress() const override { return report_.progress(); }
   // On the control thread: something that a person should read.
   void note(Notice::Kind kind, const hal::Message& text) MOLDLOFT_NONBLOCKING {
     supervisor_.note(kind, text);
   }
-  // On one other thread: what has been noted since, in order.
-  std::optional<Notice> next_notice() { return supervisor_.next_notice(); }
+  std::optional<Notice> next_notice() override { return supervisor_.next_notice(); }
   CellState state() const { return supervisor_.state(); }
   Phase phase() const { return measurement_.phase(); }
   HoldCause cause() const { return supervisor_.cause(); }

@@ -9,11 +9,11 @@
 #include "hal/base/realtime.hpp"
 #include "hal/scanner/scanner.hpp"
 #include "tasks/cell/arm_gate.hpp"
-#include "tasks/cell/cell_progress.hpp"
 #include "tasks/cell/device_start.hpp"
 #include "tasks/cell/measurement.hpp"
 #include "tasks/cell/shot_taker.hpp"
 #include "tasks/cell/supervisor.hpp"
+#include "tasks/progress/cell_progress.hpp"
 
 namespace moldloft::tasks {
 

@@ -14,9 +14,9 @@
 #include "hal/base/fixed_text.hpp"
 #include "hal/base/realtime.hpp"
 #include "hal/record/recorder.hpp"
-#include "tasks/cell/cell_progress.hpp"
-#include "tasks/cell/notice.hpp"
+#include "tasks/cell/notice_queue.hpp"
 #include "tasks/machines/cell_state.hpp"
+#include "tasks/progress/cell_progress.hpp"
 
 #include <atomic>
 #include <optional>

@@ -1,6 +1,7 @@
 #include "firmware_like/process/journal.hpp"
 
 #include "firmware_like/gateway/progress_text.hpp"
+#include "tasks/cell/notice_queue.hpp"
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>

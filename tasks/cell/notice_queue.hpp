@@ -1,5 +1,4 @@
-// What a person should read of what happened in the control thread: holds, aborts and warnings with their reasons, from
-// that thread to one other.
+// Notices on their way from the control thread to one other.
 //
 // Thread       push(): the control thread. pop(): one other thread
 // Blocking     never; no locks
@@ -7,23 +6,14 @@
 // Failure      a full queue drops the newest: the run store has all of them
 #pragma once
 
-#include "hal/base/clock.hpp"
-#include "hal/base/fixed_text.hpp"
+#include "tasks/progress/notice.hpp"
 
 #include <array>
 #include <atomic>
 #include <cstddef>
-#include <cstdint>
 #include <optional>
 
 namespace moldloft::tasks {
-
-struct Notice {
-  enum class Kind : std::uint8_t { goes_on, warning, hold, abort };
-  hal::Instant at{0};
-  Kind kind{};
-  hal::Message text;
-};
 
 class NoticeQueue {
  public:
