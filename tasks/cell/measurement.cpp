@@ -12,7 +12,7 @@ using Stage = SurfaceTask::Stage;
 
 namespace {
 
-// Plate points that go into the rough height model: a few of each shot are plenty for six coefficients.
+// Every so many plate points one goes into the rough height model: a few of each shot are plenty for six coefficients.
 constexpr std::uint32_t height_stride = 20;
 
 // How far the hint may be off once the plate has been seen: a field's width at 10 degrees.
@@ -45,7 +45,7 @@ Measurement::Measurement(const CellSettings& settings, Supervisor& supervisor, S
   boundary_places_.reserve(static_cast<std::size_t>(settings.tracker.max_shots) + 1);
 }
 
-// The background work outlives the cell; the frame that it reads and the view do not.
+// The background work outlives the cell, so it must let go of the view and of the frame.
 Measurement::~Measurement() { surface_.begin(); }
 
 std::size_t Measurement::plan_bytes() const {
@@ -61,7 +61,7 @@ void Measurement::forget() {
   apply(PhaseEvent::forget);
 }
 
-// Looks at what the background work has come to; what the tracker comes to is told in track().
+// Tells the table what the background work has come to. The tracker's part of the events comes from track().
 void Measurement::step() {
   if (surface_.stage() == Stage::failed)
     return apply(PhaseEvent::flaw, {.beyond_plan = surface_.error() == geometry::Error::capacity});
@@ -159,13 +159,13 @@ void Measurement::hold_for_flaw(HoldCause cause) {
                    hal::Message::format("{}: {}", to_string(phase_), geometry::to_string(surface_.error())));
 }
 
-// Hands a shot's frame to the background work for finding the plate in it, which may begin before all of it is there;
-// use_view() follows when that is done and the frame was accepted.
+// The background work finds the plate in the frame, and may begin before all of it is there. use_view() follows when
+// that is done and the frame is whole.
 void Measurement::frame_comes(const ShotOrder& order, const hal::Frame& frame, hal::Scanner* unpacks) {
   looked_at_ = order;
   const geometry::RigidMotion world_from_scanner =
       scanner_motion_at(order.reported, settings_.tip_from_scanner);
-  // Nobody knows a plate's height before it was seen; from then on the hint is good to a step's slope.
+  // Nobody knows the plate's height before it was seen. From then on the hint is as good as a step's slope allows.
   const double reach = order.purpose == ShotPurpose::seek ? settings_.depth_mm : hint_reach_mm;
   view_.begin(frame,
               {.hint = into_scanner(world_from_scanner, hint_in_world(order)),
@@ -177,7 +177,7 @@ void Measurement::frame_comes(const ShotOrder& order, const hal::Frame& frame, h
   accepted_ = false;
 }
 
-// What has been looked at so far was no frame: it will not become whole.
+// The frame will not become whole, so what was seen of it counts for nothing.
 void Measurement::frame_is_lost() {
   if (!look_.is_held() || accepted_) return;
   surface_.stop_looking();
@@ -196,7 +196,7 @@ void Measurement::frame_is_whole(const ShotOrder& order, const hal::Frame& frame
                    .from_archive = of_earlier_run});
 }
 
-// The next frame overwrites the last one, and its points have somewhere to go.
+// The next frame overwrites the last one, so nobody may read that any more, and the surface must be ready for points.
 bool Measurement::takes_frame() const { return frame_.is_free() && !surface_.prepares(); }
 
 void Measurement::use_view() {
@@ -216,7 +216,7 @@ void Measurement::use_shot(FrameLease lease) {
   track(looked_at_, world_from_scanner, height);
 }
 
-// Adds the shot's heights to the rough model and gives their mean; nothing when what was found is the table.
+// Adds the shot's heights to the rough model and gives their mean. Gives nothing when the scanner saw the table alone.
 std::optional<double> Measurement::learn_heights(const geometry::RigidMotion& world_from_scanner) {
   HeightModel learnt = heights_;
   double sum = 0;

@@ -1,9 +1,9 @@
-// What happens inside Execute, phase by phase (the table is phases.hpp): orders the shots that this takes, looks at
-// their frames, and gives what they show to the tracker and to the background work.
+// The measurement: what happens inside Execute, phase by phase. The table is phases.hpp; this class carries its actions
+// out. It orders shots, looks at their frames, and gives what they show to the tracker and to the background work.
 //
 // Frames       world for places and heights; the frames are the scanner's and are registered with the shot's pose
 // Thread       the control thread
-// Blocking     never; what takes longer than a tick is the background work's
+// Blocking     never; the background work does what takes longer than a tick
 // Allocation   in the constructor only
 // Failure      a plate that cannot be measured, or outgrows the memory plan, holds the cell with the reason
 #pragma once
@@ -36,9 +36,10 @@ class Measurement final : public ShotUser {
   Measurement(const Measurement&) = delete;
   Measurement& operator=(const Measurement&) = delete;
 
-  void begin() MOLDLOFT_NONBLOCKING;     // Execute is entered for the first time in a run
-  void step() MOLDLOFT_NONBLOCKING;      // once a tick in Execute; says done when the surface is there
-  void use_view() MOLDLOFT_NONBLOCKING;  // once a tick in any state: of a whole frame that has been looked at
+  void begin() MOLDLOFT_NONBLOCKING;  // Execute is entered for the first time in a run
+  void step() MOLDLOFT_NONBLOCKING;   // once a tick in Execute; says done when the surface is there
+  void use_view()
+      MOLDLOFT_NONBLOCKING;  // once a tick in any state: uses a whole frame that has been looked at
   void spend(hal::Duration in_execute) MOLDLOFT_NONBLOCKING { spent_ += in_execute; }
   void frame_is_lost() MOLDLOFT_NONBLOCKING;  // the one that arrives will not become whole
   void forget() MOLDLOFT_NONBLOCKING;
@@ -96,9 +97,9 @@ class Measurement final : public ShotUser {
 
   Phase phase_ = Phase::none;
   FrameLender frame_;
-  FrameLease look_;  // of the background work that looks at a frame, the last or the one that arrives
+  FrameLease look_;  // held while the background work looks at a frame, and until its view has been used
   ShotOrder looked_at_;
-  bool accepted_ = false;  // what is looked at is whole
+  bool accepted_ = false;  // the frame that is looked at is whole
   BoundaryTracker tracker_;
   ShotView view_;
   HeightModel heights_;

@@ -1,8 +1,8 @@
-// One shot after another: drive there, expose, let the scanner compute while the arm goes on to
-// the next place.
+// One shot after another: the arm drives to a place, the scanner exposes there, and while it computes the arm drives on
+// to the next place.
 //
-// The machine knows two resources, the arm and the scanner. An order is a pose to shoot from; the next order may come
-// as soon as EXPOSED is seen (the arm is free then), the next exposure only when the frame before has arrived.
+// The machine knows two resources, the arm and the scanner. An order is a pose to shoot from. The arm is free after
+// EXPOSED, so the next order may come then. The next exposure waits until the frame before has arrived.
 #pragma once
 
 #include "hal/base/realtime.hpp"
@@ -15,23 +15,23 @@
 namespace moldloft::tasks {
 
 enum class ShotState : std::uint8_t {
-  parked,             // arm stands, scanner free, nothing wanted
-  driving,            // to the ordered pose, scanner free
-  in_place,           // at the ordered pose, scanner free: waits until an exposure is allowed
-  exposing,           // the arm must stand
-  computing,          // exposed; the arm is free and has no order
-  driving_computing,  // on the way to the next pose while the frame before is still awaited
-  in_place_computing,
+  parked,              // the arm stands, the scanner is free, nothing is ordered
+  driving,             // the arm drives to the ordered pose, the scanner is free
+  in_place,            // the arm stands there and waits until an exposure is allowed
+  exposing,            // the arm must stand
+  computing,           // the frame is awaited; the arm is free and has no order
+  driving_computing,   // the frame is awaited while the arm drives to the next pose
+  in_place_computing,  // the frame is awaited while the arm stands at the next pose
 };
 constexpr int shot_state_count = 7;
 
 enum class ShotEvent : std::uint8_t {
   order,    // the next pose is known
   arrived,  // the arm has stopped and settled
-  clear,    // scanner ready, recorder and fit have room: an exposure is allowed
+  clear,    // an exposure is allowed: the scanner is ready, recorder and fit have room
   exposed,
   frame,
-  failed,  // the driver gave the shot up
+  failed,  // the driver has given the shot up
 };
 constexpr int shot_event_count = 6;
 
