@@ -3,6 +3,8 @@
 #include "hal/base/reserved.hpp"
 #include "tasks/planning/tool_pose.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace moldloft::tasks {
@@ -20,6 +22,21 @@ constexpr double hint_reach_mm = 18;
 
 // How far inside the outline the hint of a surface shot lies, when the field's centre is outside.
 constexpr double hint_inside_mm = 10;
+
+// Between a known point of the plate and the field's border: what is nearer may lie beyond it in the frame.
+constexpr double hint_margin_mm = 3;
+
+// Of the depth range: how far the plate may lie from where the boundary lets expect it before a field is raised to it.
+constexpr double raise_share = 1.0 / 6;
+
+// Of the depth range: how far a field is raised to see what has left it. The rest is overlap.
+constexpr double next_storey_share = 1.7;
+
+// A place is visited so often at most: as planned, above, below.
+constexpr int most_visits = 3;
+
+// So many stripes must leave the depth range before a place is visited for their sake: one may be a reflection.
+constexpr int few_stripes = 2;
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -40,6 +57,9 @@ Measurement::Measurement(const CellSettings& settings, Supervisor& supervisor, S
       shots_{shots},
       tracker_{settings.tracker},
       view_{settings.max_stripes, settings.max_points, settings.view},
+      evidence_{
+          {.max_shots = static_cast<std::size_t>(settings.tracker.max_shots) + 1 + settings.max_surface_shots,
+           .depth_mm = settings.depth_mm}},
       surface_places_(settings.max_surface_shots),
       time_left_{settings.tracker, settings.scan} {
   boundary_places_.reserve(static_cast<std::size_t>(settings.tracker.max_shots) + 1);
@@ -49,7 +69,7 @@ Measurement::Measurement(const CellSettings& settings, Supervisor& supervisor, S
 Measurement::~Measurement() { surface_.begin(); }
 
 std::size_t Measurement::plan_bytes() const {
-  return view_.bytes() + tracker_.bytes() +
+  return view_.bytes() + tracker_.bytes() + evidence_.bytes() +
          (boundary_places_.capacity() + surface_places_.capacity()) * sizeof(ShotPlace);
 }
 
@@ -126,6 +146,7 @@ void Measurement::seek() {
   surface_planned_ = surface_next_ = 0;
   plan_begun_ = false;
   heights_.reset();
+  evidence_.begin();
   spent_ = hal::Duration{0};
   time_left_.begin(settings_.start.centre.head<2>());
   surface_.begin();
@@ -207,13 +228,24 @@ void Measurement::use_shot(FrameLease lease) {
   const geometry::RigidMotion world_from_scanner =
       scanner_motion_at(looked_at_.reported, settings_.tip_from_scanner);
   if (looked_at_.purpose == ShotPurpose::surface) {
+    keep_evidence(world_from_scanner, view_.found());
     if (view_.found()) surface_.fold(view_, world_from_scanner, std::move(lease));
-    return;
+    return look_again_where_plate_is();
   }
   hal::add_within_reserve(boundary_places_, looked_at_.place);
   const std::optional<double> height = view_.found() ? learn_heights(world_from_scanner) : std::nullopt;
-  if (height) surface_.keep(view_, world_from_scanner, std::move(lease));
   track(looked_at_, world_from_scanner, height);
+  keep_evidence(world_from_scanner, height.has_value());
+  if (height) surface_.keep(view_, world_from_scanner, std::move(lease));
+}
+
+void Measurement::keep_evidence(const geometry::RigidMotion& world_from_scanner, bool plate_found) {
+  evidence_.add({.number = looked_at_.number,
+                 .purpose = looked_at_.purpose,
+                 .place = looked_at_.place,
+                 .world_from_scanner = world_from_scanner,
+                 .plate_found = plate_found},
+                view_, tracker_.edge_points().size());
 }
 
 // Adds the shot's heights to the rough model and gives their mean. Gives nothing when the scanner saw the table alone.
@@ -236,8 +268,49 @@ std::optional<double> Measurement::learn_heights(const geometry::RigidMotion& wo
   return sum / count;
 }
 
+// What earlier shots have seen of the plate in a field, or in one of so many times its size.
+std::optional<Eigen::Vector3d> Measurement::known_in_field(const ShotPlace& place, double times) const {
+  const auto half = [&](double field_mm) { return times * (field_mm / 2 - hint_margin_mm); };
+  return evidence_.known_near(place, half(settings_.scan.field_x_mm), half(settings_.scan.field_y_mm));
+}
+
+// The boundary alone does not tell how high a wavy plate's middle lies; the shots beside this one do.
+ShotPlace Measurement::raised_to_plate(ShotPlace place) const {
+  const auto known = known_in_field(place, 1);
+  if (!known) return place;
+  const double above = known->z() - heights_.at(known->x(), known->y());
+  if (std::abs(above) > raise_share * settings_.depth_mm) place.centre.z() += above;
+  return place;
+}
+
+int Measurement::visits_of(const ShotPlace& place) const {
+  const auto& shots = evidence_.evidence().shots;
+  return static_cast<int>(std::ranges::count_if(shots, [&](const ShotSeen& shot) {
+    return shot.purpose == ShotPurpose::surface &&
+           (shot.place.centre - place.centre).head<2>().squaredNorm() < 1;
+  }));
+}
+
+// A surface shot that shows no plate, or a plate that leaves the depth range, is taken again at another height.
+void Measurement::look_again_where_plate_is() {
+  ShotPlace again = looked_at_.place;
+  if (visits_of(again) >= most_visits) return;
+  if (!evidence_.evidence().shots.back().plate_found) {
+    const auto known = known_in_field(again, 2);
+    if (!known || std::abs(known->z() - again.centre.z()) < hint_reach_mm) return;
+    again.centre.z() = known->z();
+  } else {
+    const auto out = evidence_.last_out_of_depth();
+    const int more = std::max(out.above, out.below);
+    if (more < few_stripes) return;
+    again.centre.z() += (out.above > out.below ? 1 : -1) * next_storey_share * settings_.depth_mm;
+  }
+  if (visit_again(again) && shots_.is_done()) order_next();
+}
+
 Eigen::Vector3d Measurement::hint_in_world(const ShotOrder& order) const {
   if (order.purpose != ShotPurpose::surface) return tracker_.plate_hint();
+  if (const auto known = known_in_field(order.place, 1)) return *known;
   const auto& corners = surface_.outline().corners;
   const Eigen::Vector2d middle = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;
   Eigen::Vector2d p = order.place.centre.head<2>();
@@ -274,7 +347,10 @@ void Measurement::track(const ShotOrder& order, const geometry::RigidMotion& wor
 }
 
 void Measurement::order_next() {
-  if (surface_next_ < surface_planned_) shots_.order(surface_places_[surface_next_++], ShotPurpose::surface);
+  if (surface_next_ == surface_planned_) return;
+  ShotPlace& place = surface_places_[surface_next_++];
+  if (visits_of(place) == 0) place = raised_to_plate(place);
+  shots_.order(place, ShotPurpose::surface);
 }
 
 void Measurement::arm_is_free() {
@@ -283,6 +359,7 @@ void Measurement::arm_is_free() {
 
 bool Measurement::visit_again(const ShotPlace& place) {
   if (surface_planned_ == surface_places_.size()) return false;
+  if (shots_.shots_left() <= surface_planned_ - surface_next_) return false;
   surface_places_[surface_planned_++] = place;
   return true;
 }

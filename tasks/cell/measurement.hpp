@@ -10,6 +10,7 @@
 
 #include "hal/base/realtime.hpp"
 #include "tasks/cell/cell_settings.hpp"
+#include "tasks/cell/shot_evidence.hpp"
 #include "tasks/cell/shot_taker.hpp"
 #include "tasks/cell/supervisor.hpp"
 #include "tasks/cell/time_left.hpp"
@@ -70,6 +71,7 @@ class Measurement final : public ShotUser {
   std::span<const ShotPlace> surface_places() const MOLDLOFT_NONBLOCKING {
     return {surface_places_.data(), surface_planned_};
   }
+  const RunEvidence& evidence() const { return evidence_.evidence(); }
   std::uint64_t points_seen() const { return points_seen_; }
   hal::Instant surface_ready() const { return surface_ready_; }
   std::size_t view_bytes() const { return view_.bytes(); }
@@ -85,10 +87,15 @@ class Measurement final : public ShotUser {
   void order_next() MOLDLOFT_NONBLOCKING;
   void hold_for_flaw(HoldCause) MOLDLOFT_NONBLOCKING;
   void use_shot(FrameLease) MOLDLOFT_NONBLOCKING;
+  void keep_evidence(const geometry::RigidMotion& world_from_scanner, bool plate_found) MOLDLOFT_NONBLOCKING;
   std::optional<double> learn_heights(const geometry::RigidMotion& world_from_scanner) MOLDLOFT_NONBLOCKING;
   void track(const ShotOrder&, const geometry::RigidMotion& world_from_scanner,
              std::optional<double> plate_z_mm) MOLDLOFT_NONBLOCKING;
   Eigen::Vector3d hint_in_world(const ShotOrder&) const MOLDLOFT_NONBLOCKING;
+  std::optional<Eigen::Vector3d> known_in_field(const ShotPlace&, double times) const MOLDLOFT_NONBLOCKING;
+  ShotPlace raised_to_plate(ShotPlace) const MOLDLOFT_NONBLOCKING;
+  void look_again_where_plate_is() MOLDLOFT_NONBLOCKING;
+  int visits_of(const ShotPlace&) const MOLDLOFT_NONBLOCKING;
 
   const CellSettings& settings_;
   Supervisor& supervisor_;
@@ -103,6 +110,7 @@ class Measurement final : public ShotUser {
   BoundaryTracker tracker_;
   ShotView view_;
   HeightModel heights_;
+  EvidenceBook evidence_;
   std::vector<ShotPlace> boundary_places_, surface_places_;
   std::size_t surface_planned_ = 0, surface_next_ = 0;
   ZigzagPlan zigzag_;

@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
+#include <limits>
 #include <utility>
 
 namespace moldloft::tasks {
@@ -22,6 +23,12 @@ ShotTaker::ShotTaker(const CellSettings& settings, Supervisor& supervisor, const
       archive_{devices.archive},
       user_{user},
       epoch_{settings.epoch} {}
+
+std::size_t ShotTaker::shots_left() const {
+  if (settings_.devices) return std::numeric_limits<std::size_t>::max();
+  const std::uint32_t stored = archive_ == nullptr ? 0 : archive_->last();
+  return stored > last_number_ ? stored - last_number_ : 0;
+}
 
 void ShotTaker::order(const ShotPlace& place, ShotPurpose purpose) {
   ShotOrder next;

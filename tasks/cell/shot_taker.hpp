@@ -87,6 +87,8 @@ class ShotTaker {
   const Histogram& frame_to_command() const { return frame_to_command_; }
   const Histogram& data_age() const { return data_age_; }
 
+  // How many more shots there can be: without devices, those that the earlier run has left.
+  std::size_t shots_left() const MOLDLOFT_NONBLOCKING;
   bool has_driven() const { return has_driven_; }
   int retaken() const MOLDLOFT_NONBLOCKING { return retaken_; }
   hal::Instant last_frame() const { return last_frame_; }

@@ -114,6 +114,19 @@ bool ShotView::end() {
   return true;
 }
 
+Eigen::Vector3d ShotView::point_of(const PlateRun& run, std::uint32_t point) const {
+  const auto& stripe = stripes_[run.stripe];
+  return {stripe.x[point], stripe.y[point], stripe.z[point]};
+}
+
+Eigen::Vector3d ShotView::first_of(const PlateRun& run) const {
+  return is_edge(run.at_first) ? run.edge_first : point_of(run, run.first);
+}
+
+Eigen::Vector3d ShotView::last_of(const PlateRun& run) const {
+  return is_edge(run.at_last) ? run.edge_last : point_of(run, run.last);
+}
+
 void ShotView::rewind(std::uint32_t stride) {
   stride_ = stride;
   run_ = 0;

@@ -46,6 +46,9 @@ class ShotView {
 
   const geometry::BoundaryViewer::View& boundary() const { return boundary_; }
   std::span<const geometry::PlateRun> runs() const { return runs_; }
+  // Where a run begins and ends: at the plate's edge, or at its last good point.
+  Eigen::Vector3d first_of(const geometry::PlateRun&) const MOLDLOFT_NONBLOCKING;
+  Eigen::Vector3d last_of(const geometry::PlateRun&) const MOLDLOFT_NONBLOCKING;
 
   // Walks through the good points on the plate, away from its edges. next() fills `out` with as many as fit and returns
   // how many; 0 when all have been given. Takes every `stride`-th stripe and point.
@@ -63,6 +66,7 @@ class ShotView {
   bool end() MOLDLOFT_NONBLOCKING;
   bool within_margins(const geometry::PlateRun&, std::uint32_t point) const;
   bool is_outlier(const geometry::PlateRun&, std::uint32_t point) const;
+  Eigen::Vector3d point_of(const geometry::PlateRun&, std::uint32_t point) const MOLDLOFT_NONBLOCKING;
 
   ShotViewSettings settings_;
   geometry::PlateRunFinder finder_;

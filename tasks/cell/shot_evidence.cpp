@@ -1,0 +1,125 @@
+#include "tasks/cell/shot_evidence.hpp"
+
+#include "hal/base/reserved.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace moldloft::tasks {
+namespace {
+
+constexpr std::uint16_t stripe_stride = 3;  // of the runs that are kept
+constexpr std::uint32_t sample_stride = 24;
+
+// A run that ends so near to the limit of the depth range, as a share of it, ends there because of it: the slope of a
+// plate takes a stripe's next point beyond.
+constexpr double depth_share = 0.97;
+
+template <typename T>
+std::span<const T> part(const std::vector<T>& all, std::size_t begin, std::size_t end) {
+  return std::span{all}.subspan(begin, end - begin);
+}
+
+}  // namespace
+
+std::span<const SeenRun> RunEvidence::runs_of(std::size_t shot) const {
+  return part(runs, shot == 0 ? 0 : shots[shot - 1].runs_end, shots[shot].runs_end);
+}
+
+std::span<const Eigen::Vector3d> RunEvidence::samples_of(std::size_t shot) const {
+  return part(samples, shot == 0 ? 0 : shots[shot - 1].samples_end, shots[shot].samples_end);
+}
+
+EvidenceBook::EvidenceBook(const Settings& settings) : settings_{settings} {
+  kept_.shots.reserve(settings.max_shots);
+  kept_.runs.reserve(settings.max_shots * runs_a_shot);
+  kept_.samples.reserve(settings.max_shots * samples_a_shot);
+}
+
+std::size_t EvidenceBook::bytes() const {
+  return kept_.shots.capacity() * sizeof(ShotSeen) + kept_.runs.capacity() * sizeof(SeenRun) +
+         kept_.samples.capacity() * sizeof(Eigen::Vector3d);
+}
+
+void EvidenceBook::begin() {
+  kept_.shots.clear();
+  kept_.runs.clear();
+  kept_.samples.clear();
+}
+
+RunEdge EvidenceBook::edge_at(geometry::RunEnd end, const Eigen::Vector3d& in_scanner) const {
+  if (!geometry::is_edge(end)) return RunEdge::none;
+  return std::abs(in_scanner.z()) > depth_share * settings_.depth_mm ? RunEdge::out_of_depth : RunEdge::edge;
+}
+
+void EvidenceBook::add_runs(const geometry::RigidMotion& world_from_scanner, const ShotView& view) {
+  std::size_t left = runs_a_shot;
+  for (const geometry::PlateRun& run : view.runs()) {
+    if (run.stripe % stripe_stride != 0) continue;
+    if (left-- == 0) return;
+    const Eigen::Vector3d first = view.first_of(run), last = view.last_of(run);
+    hal::add_within_reserve(kept_.runs, SeenRun{.first = world_from_scanner * first,
+                                                .last = world_from_scanner * last,
+                                                .at_first = edge_at(run.at_first, first),
+                                                .at_last = edge_at(run.at_last, last)});
+  }
+}
+
+void EvidenceBook::add(const ShotSeen& shot, ShotView& view, std::size_t edge_points) {
+  if (kept_.shots.size() == kept_.shots.capacity()) return;
+  if (shot.plate_found) {
+    add_runs(shot.world_from_scanner, view);
+    std::array<Eigen::Vector3d, samples_a_shot> points;
+    view.rewind(sample_stride);
+    const std::size_t count = view.next(points);
+    for (std::size_t i = 0; i < count; ++i)
+      hal::add_within_reserve(kept_.samples, shot.world_from_scanner * points[i]);
+  }
+  ShotSeen kept = shot;
+  kept.runs_end = static_cast<std::uint32_t>(kept_.runs.size());
+  kept.samples_end = static_cast<std::uint32_t>(kept_.samples.size());
+  kept.edges_end = static_cast<std::uint32_t>(edge_points);
+  hal::add_within_reserve(kept_.shots, kept);
+}
+
+std::optional<Eigen::Vector3d> EvidenceBook::known_near(const ShotPlace& place, double field_half_x_mm,
+                                                        double field_half_y_mm) const {
+  const Eigen::Vector2d centre = place.centre.head<2>();
+  const Eigen::Vector2d along_x{std::cos(place.head_yaw), std::sin(place.head_yaw)};
+  const Eigen::Vector2d along_y{-along_x.y(), along_x.x()};
+  // Fields farther apart than this have nothing in common.
+  const double reach = 2 * std::hypot(field_half_x_mm, field_half_y_mm);
+  std::optional<Eigen::Vector3d> nearest;
+  double least = std::hypot(field_half_x_mm, field_half_y_mm);
+  const auto consider = [&](const Eigen::Vector3d& p) {
+    const Eigen::Vector2d d = p.head<2>() - centre;
+    if (std::abs(d.dot(along_x)) > field_half_x_mm || std::abs(d.dot(along_y)) > field_half_y_mm) return;
+    if (d.norm() < least) nearest = p, least = d.norm();
+  };
+  for (std::size_t i = 0; i < kept_.shots.size(); ++i) {
+    const ShotSeen& shot = kept_.shots[i];
+    if (!shot.plate_found || (shot.place.centre.head<2>() - centre).norm() > reach) continue;
+    for (const SeenRun& run : kept_.runs_of(i)) consider(run.first), consider(run.last);
+    for (const Eigen::Vector3d& p : kept_.samples_of(i)) consider(p);
+  }
+  return nearest;
+}
+
+EvidenceBook::OutOfDepth EvidenceBook::last_out_of_depth() const {
+  OutOfDepth count;
+  if (kept_.shots.empty()) return count;
+  const auto& shot = kept_.shots.back();
+  const auto look = [&](RunEdge end, const Eigen::Vector3d& p) {
+    if (end != RunEdge::out_of_depth) return;
+    ++((shot.world_from_scanner.inverse() * p).z() > 0 ? count.above : count.below);
+  };
+  for (const SeenRun& run : kept_.runs_of(kept_.shots.size() - 1)) {
+    ++count.runs;
+    look(run.at_first, run.first);
+    look(run.at_last, run.last);
+  }
+  return count;
+}
+
+}  // namespace moldloft::tasks
