@@ -6,6 +6,7 @@
 #include "firmware_like/process/build_info.hpp"
 #include "firmware_like/process/complaint.hpp"
 #include "firmware_like/process/console.hpp"
+#include "firmware_like/report/findings_text.hpp"
 #include "firmware_like/report/result_table.hpp"
 #include "hal/base/printable_text.hpp"
 #include "host_sim/cell/cell_options.hpp"
@@ -72,13 +73,16 @@ int cell_command(SimulatedRunOptions& options, bool quiet) {
     say(fmt::format("moldloft-sim cell: {}\n", moldloft::hal::printable(run.error().what)));
     return 1;
   }
-  if (run->exit_code != 0) {
-    say(fmt::format("moldloft-sim cell: {}: {}\n", to_string(run->result.outcome), run->result.message));
+  const auto& result = run->result;
+  if (!is_measured(result.outcome)) {
+    say(fmt::format("moldloft-sim cell: {}: {}\n", to_string(result.outcome),
+                    moldloft::hal::printable(result.message)));
     return run->exit_code;
   }
-  show(quiet ? fmt::format("complete: {}\n", run->folder.string())
-             : result_table(run->result, run->folder.string()));
-  return 0;
+  if (quiet) say(findings_lines(result));
+  show(quiet ? fmt::format("{}: {}\n", to_string(result.outcome), run->folder.string())
+             : result_table(result, run->folder.string()));
+  return run->exit_code;
 }
 
 void add_cell_command(CLI::App& app, SimulatedRunOptions& options, bool& quiet) {

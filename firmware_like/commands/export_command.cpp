@@ -5,6 +5,7 @@
 #include "firmware_like/process/json_file.hpp"
 #include "firmware_like/process/whole_file.hpp"
 #include "firmware_like/results/cad_files.hpp"
+#include "firmware_like/results/stored_result.hpp"
 #include "firmware_like/results/summary.hpp"
 #include "firmware_like/run/surface_file.hpp"
 #include "hal/base/printable_text.hpp"
@@ -37,6 +38,16 @@ std::expected<CadFacts, Failure> facts_beside(const fs::path& surface) {
   return cad_facts(named_in(*json));
 }
 
+// What the audit does not trust is exported only when somebody insists.
+std::expected<void, Failure> trusted(const fs::path& surface, bool insists) {
+  std::error_code failed;
+  const fs::path summary = surface.parent_path() / "summary.json";
+  if (insists || !fs::exists(summary, failed)) return {};
+  const auto result = read_result(surface.parent_path());
+  if (!result || result->outcome != Outcome::held) return {};
+  return error(fmt::format("{}: {}; --force exports it all the same", surface.string(), result->message));
+}
+
 std::expected<void, Failure> exported(const ExportOptions& options) {
   if (options.step.empty() && options.iges.empty())
     return error("export: say where to with --step FILE, --iges FILE or both");
@@ -44,6 +55,7 @@ std::expected<void, Failure> exported(const ExportOptions& options) {
   if (!path) return std::unexpected(path.error());
   const auto surface = read_surface(*path);
   if (!surface) return std::unexpected(surface.error());
+  if (const auto may = trusted(*path, options.force); !may) return may;
   const auto facts = facts_beside(*path);
   if (!facts) return std::unexpected(facts.error());
   const auto write = [&](const fs::path& file, auto&& text_of) -> std::expected<void, Failure> {

@@ -70,9 +70,10 @@ int fit_run(const FitOptions& options) {
   if (!results) return complain(results.error().what);
   results->store = std::move(run->store);
   if (const auto written = write_results(result, *results); !written) return complain(written.error().what);
-  if (const int code = exit_code(result.outcome); code != exit_done) return complain(result.message), code;
+  const int code = exit_code(result.outcome);
+  if (!is_measured(result.outcome)) return complain(result.message), code;
   show(result_table(result, options.out));
-  return exit_done;
+  return code;
 }
 
 }  // namespace moldloft::firmware_like

@@ -4,6 +4,7 @@
 #include "firmware_like/process/console.hpp"
 #include "firmware_like/process/json_file.hpp"
 #include "firmware_like/process/whole_file.hpp"
+#include "firmware_like/report/findings_text.hpp"
 #include "firmware_like/report/result_table.hpp"
 #include "firmware_like/report/timing_page.hpp"
 #include "firmware_like/report/timing_table.hpp"
@@ -28,7 +29,8 @@ int report_run(const ReportOptions& options) {
       const auto result = read_result(folder);
       if (!result) return refuse(result.error().what);
       text = result_table(*result, options.run) + "\n" + timing_table(result->timing);
-      page = timing_page(result->timing, "Timing of " + result->label.plate, about_run(*result));
+      page = timing_page(result->timing, "Timing of " + result->label.plate, about_run(*result),
+                         findings_section(*result));
     } else {  // of the self-test, which measures no plate
       const auto timing = read_json(folder / "timing.json");
       if (!timing) return refuse(timing.error().what);

@@ -77,14 +77,15 @@ std::string shell_word(const std::string& name) {
 }
 
 // One line for a run that did not complete: what happened, what is saved where, how to go on.
-std::string how_it_ended(const Controller& controller, const RunOptions& options, const std::string& folder) {
+std::string how_it_ended(const Controller& controller, const RunResult& result, const RunOptions& options,
+                         const std::string& folder) {
   const auto& cell = controller.cell();
-  const std::string state = cell.state() == tasks::CellState::held      ? "held: "
-                            : cell.state() == tasks::CellState::aborted ? "aborted: "
-                                                                        : "stopped: ";
+  const bool is_stopped = result.outcome == Outcome::stopped;
   const std::string what =
-      state + (cell.state() == tasks::CellState::stopped ? "the arm stands" : std::string{cell.why().view()});
-  if (cell.cause() == tasks::HoldCause::measurement && cell.state() != tasks::CellState::stopped) {
+      fmt::format("{}: {}", to_string(result.outcome), is_stopped ? "the arm stands" : result.message);
+  // By the audit, when there is nothing left to measure.
+  const bool untrusted = result.outcome == Outcome::held && cell.state() == tasks::CellState::complete;
+  if (untrusted || (cell.cause() == tasks::HoldCause::measurement && !is_stopped)) {
     return fmt::format("{}. What was measured is saved in {} (overview.svg shows it); then begin a new run",
                        what, folder);
   }
@@ -197,6 +198,12 @@ void warn_of_health(const RunResult& result) {
         "moldloft", Priority::warning);
 }
 
+// Under the journal, and where no table is printed.
+void say_findings(const RunResult& result, bool quiet) {
+  if (!quiet && !stderr_is_journal()) return;
+  for (const Finding& finding : result.findings) complain(finding.text, "moldloft", Priority::warning);
+}
+
 // What is left behind and said when the cell has come to rest.
 int wind_up(Controller& controller, RunFolder folder, const RunOptions& options, bool resumed,
             const RunConditions& conditions) {
@@ -223,17 +230,18 @@ int wind_up(Controller& controller, RunFolder folder, const RunOptions& options,
                          folder.path.string()));
   const auto written = write_results(result, folder);
   if (!written) complain(written.error().what);
-  if (code != exit_done)
-    complain(how_it_ended(controller, options, folder.path.string()), "moldloft", priority_of(code));
+  if (!is_measured(result.outcome))
+    complain(how_it_ended(controller, result, options, folder.path.string()), "moldloft", priority_of(code));
   if (!written) return exit_failed;
-  if (code != exit_done) return code;
+  if (!is_measured(result.outcome)) return code;
+  say_findings(result, options.quiet);
   const std::string answer = options.quiet
-                                 ? fmt::format("complete: {}\n", folder.path.string())
+                                 ? fmt::format("{}: {}\n", to_string(result.outcome), folder.path.string())
                                  : result_table(result, folder.path.string()) + timing_lines(result.timing);
   if (!show_within(patience_with_a_reader, answer))
-    complain(fmt::format("complete; the table cannot be written to standard output: moldloft report {}",
-                         folder.path.string()));
-  return store_failed ? exit_failed : exit_done;
+    complain(fmt::format("{}; the table cannot be written to standard output: moldloft report {}",
+                         to_string(result.outcome), folder.path.string()));
+  return store_failed ? exit_failed : code;
 }
 
 }  // namespace

@@ -157,6 +157,10 @@ void read_rest(TomlSection& file, CellConfig& c) {
   fit.number("finest_span_mm", c.finest_span_mm, 1, 500);
   fit.number("tolerance_mm", c.fit_tolerance_mm, 0, 10);
   fit.finish();
+
+  TomlSection audit = file.section("audit");
+  audit.number("unseen_percent", c.unseen_percent, 0, 100);
+  audit.finish();
 }
 
 // Every key with its value as text, "scanner.mount.zyz_deg" -> "[ 0, 180, 180 ]".
@@ -284,7 +288,7 @@ std::string first_difference(const std::string& text, const std::string& other) 
   for (auto* keys : {&a, &b}) {
     for (const char* no_matter :
          {"cell.name", "cell.device_timeout_s", "cell.scanner_wait_s", "cell.disk_wait_s", "robot.arrival_mm",
-          "robot.arrival_deg", "plate.largest_mm"}) {
+          "robot.arrival_deg", "plate.largest_mm", "audit.unseen_percent"}) {
       keys->erase(no_matter);
     }
     for (const char* section : {"scanner", "robot"})

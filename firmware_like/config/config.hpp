@@ -76,6 +76,7 @@ struct CellConfig {
   double scan_margin_mm = 2;
   double finest_span_mm = 10;  // of the surface's net
   double fit_tolerance_mm = 0.005;
+  double unseen_percent = 2;  // of the plate's area; a result of which more was not seen is not trusted
   RealtimeConfig realtime;
 };
 

@@ -1,6 +1,8 @@
 #include "firmware_like/controller/result_of.hpp"
 
+#include "firmware_like/config/cell_settings.hpp"
 #include "firmware_like/process/build_info.hpp"
+#include "firmware_like/results/audit.hpp"
 #include "firmware_like/results/timing_report.hpp"
 
 #include <algorithm>
@@ -77,7 +79,14 @@ RunResult result_of(const Controller& c, const RunLabel& label, const RunConditi
   r.measured = measured_by(c);
   r.track = track_of(c);
   r.tip_from_scanner = c.config().scanner.tip_from_scanner;
-  r.noise_mm = c.config().scanner.noise_mm;
+  const auto net = surface_settings(c.config()).fit;
+  r.promised = {.noise_mm = c.config().scanner.noise_mm,
+                .repeatability_z_mm = c.config().robot.repeatability_z_mm,
+                .finest_span_mm = c.config().finest_span_mm,
+                .finest_spans_u = net.max_spans_u,
+                .finest_spans_v = net.max_spans_v,
+                .largest_unseen = c.config().unseen_percent / 100};
+  r.evidence = cell.evidence();
   r.cycle = shares_of(cell.cycle());
   r.memory = c.memory();
   r.recorder_lost = c.recorder().lost();
@@ -86,6 +95,7 @@ RunResult result_of(const Controller& c, const RunLabel& label, const RunConditi
                             .conditions = conditions,
                             .losses = losses_of(c),
                             .dumps_too_soon = c.flight().later_triggers()});
+  take_audit(r);
   return r;
 }
 

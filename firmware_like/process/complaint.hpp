@@ -15,6 +15,7 @@ enum ExitCode : int {
   exit_held = 2,    // the cell holds for a person
   exit_aborted = 3,
   exit_stopped = 4,  // by ctrl-C
+  exit_warned = 5,   // measured, with warnings: the audit's findings
 };
 
 // The one line that a failure is; the exit code that goes with it.

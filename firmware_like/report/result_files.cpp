@@ -1,6 +1,7 @@
 #include "firmware_like/report/result_files.hpp"
 
 #include "firmware_like/process/whole_file.hpp"
+#include "firmware_like/report/findings_text.hpp"
 #include "firmware_like/report/picture.hpp"
 #include "firmware_like/report/timing_page.hpp"
 #include "firmware_like/results/cad_files.hpp"
@@ -67,10 +68,16 @@ std::expected<std::vector<PlateField>, Failure> write_surface(const RunResult& r
                                                               const std::optional<PlateField>& error_field,
                                                               const Write& write) {
   const auto& surface = r.measured->surface;
-  const double gate = gate_sigmas * std::max(r.measured->fit.sigma_mm, r.noise_mm);
+  const double gate = gate_sigmas * std::max(r.measured->fit.sigma_mm, r.promised.noise_mm);
   const auto points = measured_points(r, *folder.store, points_in_ply, gate);
   if (!points) return std::unexpected{Failure{points.error().what}};
   write("surface.json", json_text(surface_json(surface)) + "\n");
+  write("boundary.ply", boundary_ply(surface, 100));
+  write("points.ply", points_ply(*points));
+  std::vector fields{shape_field(surface, picture_cells),
+                     error_field ? *error_field : residual_field(*points, picture_cells)};
+  // Nobody shall bend a plate after a file that the audit does not trust.
+  if (r.outcome == Outcome::held) return fields;
   const CadFacts facts = cad_facts(r);
   const auto step = step_file(surface, facts, "surface.step"),
              iges = iges_file(surface, facts, "surface.igs");
@@ -78,10 +85,7 @@ std::expected<std::vector<PlateField>, Failure> write_surface(const RunResult& r
   if (!iges) return std::unexpected{iges.error()};
   write("surface.step", *step);
   write("surface.igs", *iges);
-  write("boundary.ply", boundary_ply(surface, 100));
-  write("points.ply", points_ply(*points));
-  return std::vector{shape_field(surface, picture_cells),
-                     error_field ? *error_field : residual_field(*points, picture_cells)};
+  return fields;
 }
 
 }  // namespace
@@ -105,7 +109,8 @@ std::expected<void, Failure> write_results(const RunResult& r, const RunFolder& 
   write("track.json", json_text(track_json(r)) + "\n");
   write("overview.svg", picture(r, std::move(fields)));
   write("timing.json", json_text(r.timing, 2) + "\n");
-  write("report.html", timing_page(r.timing, "Timing of " + r.label.plate, about_run(r)));
+  write("report.html",
+        timing_page(r.timing, "Timing of " + r.label.plate, about_run(r), findings_section(r)));
   write("summary.json", json_text(summary_json(r), 2) + "\n");
   return result;
 }

@@ -1,5 +1,6 @@
 #include "firmware_like/report/result_table.hpp"
 
+#include "firmware_like/report/findings_text.hpp"
 #include "hal/base/printable_text.hpp"
 
 #include <fmt/format.h>
@@ -37,6 +38,7 @@ std::string result_table(const RunResult& r, const std::string& folder) {
                     r.truth["normal_rms_mm"].get<double>(), r.truth["normal_max_mm"].get<double>(),
                     r.truth["outline_max_mm"].get<double>(), r.truth["corner_max_mm"].get<double>()));
   }
+  t += findings_lines(r);
   row("run folder", folder);
   return t;
 }

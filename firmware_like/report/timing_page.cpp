@@ -116,11 +116,12 @@ std::string in_us(const Json& h, const char* key) {
   return h.is_object() && h.contains(key) && h.at(key).is_number() ? figure(h.at(key)) + " us" : "-";
 }
 
-std::string head(const Json& t, std::string_view title, std::string_view about) {
+std::string head(const Json& t, std::string_view title, std::string_view about, std::string_view first) {
   const bool yes = t.value("representative", false);
   std::string html = fmt::format("<h1>{}</h1>\n<p class=\"soft\">{} ticks of {} us</p>\n", escaped(title),
                                  figure(t, "ticks"), figure(t, "tick_us"));
   if (!about.empty()) html += fmt::format("<p class=\"soft\">{}</p>\n", escaped(about));
+  html += first;
   html += yes ? std::string{"<div class=\"verdict yes\"><b>Representative.</b> The machine was set up as it is meant "
                             "to be; the figures say what this cell does.</div>\n"}
               : fmt::format("<div class=\"verdict no\"><b>Not representative:</b> {}.</div>\n",
@@ -392,13 +393,14 @@ std::string page_title(const std::filesystem::path& folder) {
   return "Timing of " + path.filename().string();
 }
 
-std::string timing_page(const Json& t, std::string_view title, std::string_view about) {
+std::string timing_page(const Json& t, std::string_view title, std::string_view about,
+                        std::string_view first) {
   std::string html = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>{}</title>\n"
       "<style>{}</style>\n</head>\n<body>\n<main>\n",
       escaped(title), style);
-  html += head(t, title, about) + wake_up(t);
+  html += head(t, title, about, first) + wake_up(t);
   html += plot_of(t, "execution", "What the table takes", "All tasks of a tick together.",
                   "execution of the table", 100ns);
   html += plot_of(t, "slack", "What is left of a tick",

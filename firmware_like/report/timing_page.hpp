@@ -14,7 +14,9 @@
 
 namespace moldloft::firmware_like {
 
-std::string timing_page(const Json& timing, std::string_view title, std::string_view about = "");
+// `first` is HTML that stands before the timing: what else the page is about.
+std::string timing_page(const Json& timing, std::string_view title, std::string_view about = "",
+                        std::string_view first = "");
 std::string page_title(const std::filesystem::path& folder);  // "Timing of plate-17"
 
 }  // namespace moldloft::firmware_like

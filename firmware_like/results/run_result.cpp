@@ -12,7 +12,8 @@ struct OutcomeRow {
   std::string_view word;
   int exit_code;
 };
-constexpr std::array<OutcomeRow, 4> outcomes{{{Outcome::complete, "complete", exit_done},
+constexpr std::array<OutcomeRow, 5> outcomes{{{Outcome::complete, "complete", exit_done},
+                                              {Outcome::warned, "warned", exit_warned},
                                               {Outcome::held, "held", exit_held},
                                               {Outcome::aborted, "aborted", exit_aborted},
                                               {Outcome::stopped, "stopped", exit_stopped}}};
@@ -25,6 +26,7 @@ const OutcomeRow& row_of(Outcome outcome) {
 
 std::string_view to_string(Outcome outcome) { return row_of(outcome).word; }
 int exit_code(Outcome outcome) { return row_of(outcome).exit_code; }
+bool is_measured(Outcome outcome) { return outcome == Outcome::complete || outcome == Outcome::warned; }
 
 std::optional<Outcome> outcome_named(std::string_view word) {
   const auto* row = std::ranges::find(outcomes, word, &OutcomeRow::word);

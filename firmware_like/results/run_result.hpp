@@ -8,11 +8,13 @@
 
 #include "firmware_like/config/memory_plan.hpp"
 #include "firmware_like/process/json_text.hpp"
+#include "firmware_like/results/finding.hpp"
 #include "geometry/edges/outline.hpp"
 #include "geometry/fit/surface_fit.hpp"
 #include "geometry/rigid_motion.hpp"
 #include "geometry/splines/bspline.hpp"
 #include "hal/base/clock.hpp"
+#include "tasks/cell/shot_evidence.hpp"
 #include "tasks/machines/boundary_tracker.hpp"
 
 #include <array>
@@ -24,10 +26,17 @@
 
 namespace moldloft::firmware_like {
 
-enum class Outcome : std::uint8_t { complete, held, aborted, stopped };
+enum class Outcome : std::uint8_t {
+  complete,
+  warned,  // complete, and the audit has found something that a person must know
+  held,
+  aborted,
+  stopped,
+};
 std::string_view to_string(Outcome);
 std::optional<Outcome> outcome_named(std::string_view);
-int exit_code(Outcome);  // as complaint.hpp has them
+int exit_code(Outcome);     // as complaint.hpp has them
+bool is_measured(Outcome);  // complete, be it with warnings
 
 // What the run is called, and when and by what it was made.
 struct RunLabel {
@@ -62,6 +71,15 @@ struct RunTrack {
   double field_x_mm = 102, field_y_mm = 102;  // of the scanner
 };
 
+// What the configuration says of devices and result, and the audit asks for.
+struct Promise {
+  double noise_mm = 0.051;            // of a point's height
+  double repeatability_z_mm = 0.013;  // of the arm's height from stop to stop
+  double finest_span_mm = 10;
+  int finest_spans_u = 32, finest_spans_v = 32;  // what the memory plan has room for
+  double largest_unseen = 0.02;  // share of the plate's area without points beyond which it is not measured
+};
+
 struct CycleShares {
   double seconds = 0, idle_fraction = 0, standing_fraction = 0;
 };
@@ -75,11 +93,12 @@ struct RunResult {
 
   ShotCounts shots;
   std::uint64_t points_seen = 0, edge_points = 0;
-  std::optional<MeasuredPlate> measured;  // of a run that is complete
+  std::optional<MeasuredPlate> measured;  // where the fit came to its end
   RunTrack track;
+  Promise promised;
+  tasks::RunEvidence evidence;    // not on disk: what follows from it are the findings
+  std::vector<Finding> findings;  // the audit's, the gravest first
   geometry::RigidMotion tip_from_scanner = geometry::RigidMotion::Identity();
-  double noise_mm = 0;  // of a point, as the configuration states it
-
   CycleShares cycle;
   MemoryPlan memory;
   std::uint64_t recorder_lost = 0;

@@ -97,7 +97,9 @@ bool holds_complete_run(const fs::path& path) {
   std::error_code failed;
   if (!holds_run(path) || !fs::exists(path / "summary.json", failed)) return false;
   const auto summary = read_json(path / "summary.json");
-  return summary && summary->is_object() && summary->value("result", Json{}) == "complete";
+  if (!summary || !summary->is_object()) return false;
+  const Json result = summary->value("result", Json{});
+  return result == "complete" || result == "warned";
 }
 
 std::expected<RunFolder, Failure> create_run(const fs::path& asked, const std::string& config_text,

@@ -85,7 +85,7 @@ Row run_job(const CampaignOptions& options, const Job& job, const std::filesyste
     row.result = done->summary["result"].get<std::string>();
     row.message = done->summary["message"].get<std::string>();
     if (done->summary.contains("truth")) row.truth = done->summary["truth"];
-    row.good = row.result == "complete" && within_limits(row.truth);
+    row.good = is_measured(done->result.outcome) && within_limits(row.truth);
   } else {
     row.message = done.error().what;
   }

@@ -65,7 +65,7 @@ std::string values(const CellConfig& c) {
                      c.start.head_yaw) +
          fmt::format("{} {} {} {} ", c.tracking_overlap_mm, c.tracking_crossing_deg, c.seek_step_mm,
                      c.seek_limit_mm) +
-         fmt::format("{} {} {} {} ", c.scan_overlap_mm, c.scan_margin_mm, c.finest_span_mm,
+         fmt::format("{} {} {} {} {} ", c.scan_overlap_mm, c.scan_margin_mm, c.unseen_percent, c.finest_span_mm,
                      c.fit_tolerance_mm) +
          fmt::format("{} {} {} {} {}", c.realtime.lock_memory, c.realtime.heap_reserve_mib,
                      c.realtime.priority, c.realtime.cpu, c.realtime.cpu_latency_us);
@@ -118,6 +118,7 @@ std::string changed(const std::string& line) {
                                                                          {"margin_mm", "3"},
                                                                          {"finest_span_mm", "12"},
                                                                          {"tolerance_mm", "0.01"},
+                                                                         {"unseen_percent", "3"},
                                                                          {"lock_memory", "false"},
                                                                          {"heap_reserve_mib", "8"},
                                                                          {"priority", "49"},
@@ -164,7 +165,7 @@ TEST_CASE("every key of the example is read: another value makes another configu
     other.erase(other.begin() + static_cast<std::ptrdiff_t>(i));
     CHECK(values(parsed(joined(other))) == before);
   }
-  CHECK(keys == 51);
+  CHECK(keys == 52);
   CHECK(fixed == 3);
 }
 
@@ -185,7 +186,7 @@ TEST_CASE("what is wrong is told in one line with file, line, key and what is al
         "host, link, port, "
         "repeatability_z_mm, speed_percent, workspace");
   CHECK(refusal("\nrobots = 1\n") ==
-        "cell.toml:2: robots: unknown key; known here: cell, fit, plate, realtime, robot, scan, scanner, "
+        "cell.toml:2: robots: unknown key; known here: audit, cell, fit, plate, realtime, robot, scan, scanner, "
         "schema, "
         "start, tracking");
   CHECK(refusal("[scanner.mount]\nx = 1\n") ==
