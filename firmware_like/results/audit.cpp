@@ -4,6 +4,7 @@
 #include "firmware_like/results/shot_agreement.hpp"
 #include "firmware_like/results/shot_motion.hpp"
 #include "firmware_like/results/sight_map.hpp"
+#include "firmware_like/results/surface_swing.hpp"
 #include "geometry/edges/outline_check.hpp"
 #include "geometry/fit/plan_map.hpp"
 #include "tasks/planning/outline_words.hpp"
@@ -20,9 +21,11 @@ namespace {
 constexpr double degrees = 180 / std::numbers::pi;
 
 // An outline that is wrong by no more than this is a matter of the rim; beyond it the plate has another shape.
-constexpr double other_shape_mm = 2;
+constexpr double smooth_rim_mm = 2;
 // Parts of the plate without points, smaller than this in all, are what a tack or a scratch hides.
 constexpr double smallest_unseen_mm2 = 16;
+// A surface that leaves its points by less is what the points themselves scatter.
+constexpr double smallest_swing_mm = 0.25;
 constexpr std::size_t most_named = 8;  // of one kind; the rest is counted
 
 // Standard deviation of an edge's place: its spacing, and where the arm stands in plan. On good plates, in 300 runs on
@@ -85,6 +88,7 @@ class Audit {
   void check_edge_points();
   void check_planned_shots();
   void check_sight();
+  void check_swings(const std::vector<UnseenPart>&);
   void check_agreement();
   void say_cause(const Motion&, double worst_mm);
   void check_noise();
@@ -107,6 +111,15 @@ void Audit::check_edge_points() {
   const auto deviations = geometry::check_outline(plate_.outline, r_.track.edge_points,
                                                   {.limit_mm = geometry::outline_limit_mm(edge_sigma_mm)});
   if (!deviations) return;
+  // Where most of the rim is ragged, a corner that is off by as much is another tooth.
+  double ragged_length = 0, teeth = 0;
+  for (const auto& d : *deviations) {
+    if (d.kind != Kind::ragged) continue;
+    ragged_length += d.length_mm;
+    teeth = std::max(teeth, d.distance_mm());
+  }
+  const double other_shape_mm =
+      ragged_length > outline_.length_mm() / 2 ? std::max(smooth_rim_mm, 1.5 * teeth) : smooth_rim_mm;
   std::vector<Finding> named;
   const geometry::OutlineDeviation* shape = nullptr;  // the farthest that is no matter of the rim
   for (const auto& d : *deviations) {
@@ -165,6 +178,7 @@ void Audit::check_planned_shots() {
 
 void Audit::check_sight() {
   const auto parts = SightMap{outline_, r_.evidence}.unseen();
+  check_swings(parts);
   double unseen = 0;
   for (const auto& part : parts) unseen += part.area_mm2;
   if (unseen < smallest_unseen_mm2) return;
@@ -192,6 +206,20 @@ void Audit::check_sight() {
              100 * share, area_text(unseen), place_text(parts.front().centre),
              100 * r_.promised.largest_unseen)});
   add_named(std::move(named), "parts");
+}
+
+void Audit::check_swings(const std::vector<UnseenPart>& unseen) {
+  const double limit = std::max(smallest_swing_mm, contradiction * r_.promised.noise_mm);
+  std::vector<Finding> named;
+  for (const auto& s : surface_swings(outline_, unseen, r_.evidence, map_, plate_.surface, limit))
+    named.push_back({.kind = FindingKind::between_points,
+                     .gravity = Gravity::warning,
+                     .place = s.place,
+                     .size_mm = std::abs(s.height_mm),
+                     .text = fmt::format("at {} the surface lies {:.1f} mm off what was seen nearest to it, "
+                                         "{:.0f} mm away: do not use it there",
+                                         place_text(s.place), s.height_mm, s.from_points_mm)});
+  add_named(std::move(named), "places");
 }
 
 // Of the mean of its samples: the arm's repeatability, the points' noise, and what the net may miss.

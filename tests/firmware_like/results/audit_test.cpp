@@ -260,3 +260,35 @@ TEST_CASE("of many findings of one kind some are named and the rest is counted")
   CHECK(std::ranges::any_of(findings,
                             [](const Finding& f) { return f.text.find("parts more") != f.text.npos; }));
 }
+
+TEST_CASE("a surface that swings where nothing was measured is named there") {
+  MadeUpRun run;
+  // Nobody has seen the first corner: 40 mm of it.
+  run.sees = [](std::size_t, const Eigen::Vector2d& p) { return (p - plate_at).sum() > 40; };
+  RunResult r = run.result();
+  r.promised.largest_unseen = 0.1;
+  CHECK(found(audit(r), FindingKind::between_points) == nullptr);
+  r.measured->surface.z(0, 0) += 3;
+  const auto findings = audit(r);
+  INFO(texts(findings));
+  const auto* swing = found(findings, FindingKind::between_points);
+  REQUIRE(swing != nullptr);
+  CHECK((*swing->place - plate_at).norm() < 10);
+  CHECK(swing->size_mm == doctest::Approx(3).epsilon(0.4));
+}
+
+TEST_CASE("where most of the rim is ragged its teeth are warnings and no other shape") {
+  RunResult r = MadeUpRun{}.result();
+  for (auto& p : r.track.edge_points) {
+    const bool on_x_side =
+        std::abs(p.y() - plate_at.y()) < 2 || std::abs(p.y() - plate_at.y() - plate_y_mm) < 2;
+    const double along = on_x_side ? p.x() : p.y();
+    const Eigen::Vector2d inwards =
+        on_x_side ? Eigen::Vector2d{0, p.y() < 0 ? 1 : -1} : Eigen::Vector2d{p.x() < 250 ? 1 : -1, 0};
+    if (std::fmod(along + 1000, 20) < 10) p += 4 * inwards;
+  }
+  take_audit(r);
+  INFO(texts(r.findings));
+  CHECK(r.outcome == Outcome::warned);
+  CHECK(says(found(r.findings, FindingKind::ragged_rim), "a ragged rim, up to 4"));
+}
