@@ -76,7 +76,8 @@ int cell_command(SimulatedRunOptions& options, bool quiet) {
   const auto& result = run->result;
   if (!is_measured(result.outcome)) {
     say(fmt::format("moldloft-sim cell: {}: {}\n", to_string(result.outcome),
-                    moldloft::hal::printable(result.message)));
+                    moldloft::hal::printable(result.message)) +
+        findings_lines(result));
     return run->exit_code;
   }
   if (quiet) say(findings_lines(result));

@@ -5,6 +5,7 @@
 #include "firmware_like/process/complaint.hpp"
 #include "firmware_like/process/console.hpp"
 #include "firmware_like/process/json_file.hpp"
+#include "firmware_like/report/findings_text.hpp"
 #include "firmware_like/report/result_files.hpp"
 #include "firmware_like/report/result_table.hpp"
 #include "hal/links/cable.hpp"
@@ -71,7 +72,7 @@ int fit_run(const FitOptions& options) {
   results->store = std::move(run->store);
   if (const auto written = write_results(result, *results); !written) return complain(written.error().what);
   const int code = exit_code(result.outcome);
-  if (!is_measured(result.outcome)) return complain(result.message), code;
+  if (!is_measured(result.outcome)) return complain(result.message), say(findings_lines(result)), code;
   show(result_table(result, options.out));
   return code;
 }

@@ -201,7 +201,8 @@ void warn_of_health(const RunResult& result) {
 // Under the journal, and where no table is printed.
 void say_findings(const RunResult& result, bool quiet) {
   if (!quiet && !stderr_is_journal()) return;
-  for (const Finding& finding : result.findings) complain(finding.text, "moldloft", Priority::warning);
+  for (const Finding& finding : result.findings)
+    complain(fmt::format("{}: {}", to_string(finding.gravity), finding.text), "moldloft", Priority::warning);
 }
 
 // What is left behind and said when the cell has come to rest.
@@ -233,7 +234,7 @@ int wind_up(Controller& controller, RunFolder folder, const RunOptions& options,
   if (!is_measured(result.outcome))
     complain(how_it_ended(controller, result, options, folder.path.string()), "moldloft", priority_of(code));
   if (!written) return exit_failed;
-  if (!is_measured(result.outcome)) return code;
+  if (!is_measured(result.outcome)) return say_findings(result, true), code;
   say_findings(result, options.quiet);
   const std::string answer = options.quiet
                                  ? fmt::format("{}: {}\n", to_string(result.outcome), folder.path.string())

@@ -8,7 +8,11 @@
 namespace moldloft::firmware_like {
 namespace {
 
+constexpr std::string_view not_audited =
+    "none: an earlier version has measured this run; `moldloft fit RUN --out DIR` audits it";
+
 std::string verdict_of(const RunResult& r) {
+  if (!r.is_audited && r.outcome == Outcome::complete) return "";
   switch (r.outcome) {
     case Outcome::complete:
       return "<div class=\"verdict yes\"><b>Complete.</b> Every edge point lies on the outline, every shot "
@@ -30,6 +34,7 @@ std::string verdict_of(const RunResult& r) {
 
 std::string findings_lines(const RunResult& r) {
   std::string text;
+  if (r.measured && !r.is_audited) text = fmt::format("{:<28}{}\n", "audit", not_audited);
   for (const Finding& f : r.findings)
     text += fmt::format("{:<28}{}\n", to_string(f.gravity), hal::printable(f.text));
   return text;
@@ -38,6 +43,7 @@ std::string findings_lines(const RunResult& r) {
 std::string findings_section(const RunResult& r) {
   if (!r.measured) return "";
   std::string html = "<section>\n<h2>Is the result true?</h2>\n" + verdict_of(r);
+  if (!r.is_audited) return html + fmt::format("<p>{}</p>\n</section>\n", not_audited);
   if (r.findings.empty()) return html + "</section>\n";
   html +=
       "<div class=\"wide\"><table class=\"words\">\n<thead><tr><th></th><th>what was found</th><th>at x, y, "

@@ -383,6 +383,7 @@ std::vector<Finding> audit(const RunResult& r) {
 void take_audit(RunResult& r) {
   if (r.outcome != Outcome::complete) return;
   r.findings = audit(r);
+  r.is_audited = true;
   if (r.findings.empty()) return;
   if (r.findings.front().gravity == Gravity::warning) {
     r.outcome = Outcome::warned;

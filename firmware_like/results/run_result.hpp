@@ -96,7 +96,8 @@ struct RunResult {
   std::optional<MeasuredPlate> measured;  // where the fit came to its end
   RunTrack track;
   Promise promised;
-  tasks::RunEvidence evidence;    // not on disk: what follows from it are the findings
+  tasks::RunEvidence evidence;  // not on disk: what follows from it are the findings
+  bool is_audited = false;      // not where the fit did not come to its end, nor of runs of earlier versions
   std::vector<Finding> findings;  // the audit's, the gravest first
   geometry::RigidMotion tip_from_scanner = geometry::RigidMotion::Identity();
   CycleShares cycle;

@@ -29,7 +29,7 @@ enum class Cause : std::uint8_t { moved, drift, mount };
 
 struct Motion {
   Cause cause{};
-  double explained = 0;            // share of the squared disagreement that is not chance
+  double explained = 0;  // share of the squared disagreement that is not chance
   // Its place in the evidence. moved: the first shot after it; mount: 0, or the shot from which on a plate that was
   // moved would look just so.
   std::size_t shot = 0;

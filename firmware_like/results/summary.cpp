@@ -74,7 +74,7 @@ Json summary_json(const RunResult& r) {
   j["seed"] = r.label.seed ? Json(*r.label.seed) : Json(nullptr);
   if (!r.label.begun.empty()) j["begun"] = r.label.begun;
   j["program"] = {{"version", r.program.version}, {"commit", r.program.commit}, {"build", r.program.build}};
-  j["findings"] = findings_json(r.findings);
+  if (r.is_audited) j["findings"] = findings_json(r.findings);
   j["shots"] = {{"seek", r.shots.seek},
                 {"boundary", r.shots.boundary},
                 {"surface", r.shots.surface},
@@ -132,7 +132,8 @@ std::expected<RunResult, Failure> read_summary(const Json& j) {
     if (j.at("schema") != 1 || !outcome) return std::unexpected{Failure{"schema 1 is needed"}};
     r.outcome = *outcome;
     r.message = j.at("message");
-    r.findings = findings_in(j.value("findings", Json::array()));
+    r.is_audited = j.contains("findings");
+    if (r.is_audited) r.findings = findings_in(j["findings"]);
     const auto& shots = j.at("shots");
     r.shots = {shots.at("seek"), shots.at("boundary"), shots.at("surface"), shots.at("retaken")};
     r.points_seen = j.at("points").at("total");

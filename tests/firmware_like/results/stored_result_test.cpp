@@ -1,6 +1,7 @@
 #include "firmware_like/results/stored_result.hpp"
 
 #include "firmware_like/process/whole_file.hpp"
+#include "firmware_like/report/findings_text.hpp"
 #include "firmware_like/report/result_table.hpp"
 #include "firmware_like/results/cad_files.hpp"
 #include "firmware_like/results/summary.hpp"
@@ -61,6 +62,17 @@ RunResult a_result() {
   r.cycle = {.seconds = 17.5, .idle_fraction = 0.25, .standing_fraction = 0.125};
   r.memory = {{"recorder rings", 100, 50}, {"surface fit", 200, 200}};
   r.recorder_lost = 6;
+  r.is_audited = true;
+  r.findings = {{.kind = FindingKind::unseen,
+                 .gravity = Gravity::warning,
+                 .place = Eigen::Vector2d{1.5, 2.25},
+                 .size_mm = 16,
+                 .text = "no points there"},
+                {.kind = FindingKind::noise,
+                 .gravity = Gravity::warning,
+                 .place = {},
+                 .size_mm = 0.25,
+                 .text = "too much"}};
   r.timing = {{"schema", 1}, {"ticks", 17500}};
   r.truth = {
       {"normal_rms_mm", 0.001}, {"normal_max_mm", 0.002}, {"outline_max_mm", 0.03}, {"corner_max_mm", 0.04}};
@@ -89,6 +101,7 @@ TEST_CASE("a result that is read from its folder makes the same summary, table, 
   CHECK(read->timing == taken.timing);
   CHECK(about_run(*read) == about_run(taken));
   CHECK(result_table(*read, "here") == result_table(taken, "here"));
+  CHECK(findings_section(*read) == findings_section(taken));
   CHECK(step_file(read->measured->surface, cad_facts(*read), "s.step").value() ==
         step_file(taken.measured->surface, cad_facts(taken), "s.step").value());
   CHECK(read->measured->outline.sides[2].value(0.5) == taken.measured->outline.sides[2].value(0.5));
