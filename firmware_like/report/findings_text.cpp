@@ -46,12 +46,14 @@ std::string findings_section(const RunResult& r) {
   if (!r.is_audited) return html + fmt::format("<p>{}</p>\n</section>\n", not_audited);
   if (r.findings.empty()) return html + "</section>\n";
   html +=
-      "<div class=\"wide\"><table class=\"words\">\n<thead><tr><th></th><th>what was found</th><th>at x, y, "
+      "<div class=\"wide\"><table class=\"words\">\n<thead><tr><th></th><th></th><th>what was "
+      "found</th><th>at x, y, "
       "mm</th>"
       "</tr></thead>\n<tbody>\n";
+  int number = 0;
   for (const Finding& f : r.findings) {
     const std::string place = f.place ? fmt::format("{:.0f}, {:.0f}", f.place->x(), f.place->y()) : "-";
-    html += fmt::format("<tr><td{}>{}</td><td>{}</td><td>{}</td></tr>\n",
+    html += fmt::format("<tr><td>{}</td><td{}>{}</td><td>{}</td><td>{}</td></tr>\n", ++number,
                         f.gravity == Gravity::untrusted ? " class=\"bad\"" : "", to_string(f.gravity),
                         escaped(f.text), place);
   }

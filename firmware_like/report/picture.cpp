@@ -269,6 +269,20 @@ std::string outline(const OverviewInput& in, const View& view) {
   return svg;
 }
 
+// Numbered as in the list of findings on the run's page.
+std::string marks(const OverviewInput& in, const View& view) {
+  std::string svg;
+  for (std::size_t i = 0; i < in.findings.size(); ++i) {
+    if (!in.findings[i].place) continue;
+    const Vector2d q = view.px(*in.findings[i].place);
+    svg += fmt::format(
+        "<circle cx='{0:.1f}' cy='{1:.1f}' r='9' fill='none' stroke='#c00' stroke-width='2.4'/>"
+        "<text x='{2:.1f}' y='{3:.1f}' class='mark'>{4}</text>\n",
+        q.x(), q.y(), q.x() + 11, q.y() - 7, i + 1);
+  }
+  return svg;
+}
+
 // A bar of a round length, so that the eye has a measure.
 std::string scale_bar(const View& view, double bottom) {
   const double wanted = (view.max.x() - view.min.x()) / 4;
@@ -295,6 +309,8 @@ std::string legend_line(const OverviewInput& in) {
       in.surface != nullptr ? "black: outline and corners" : "black: edge points and corners seen";
   if (!in.boundary_places.empty()) line += "; orange: the tracker's path";
   if (!in.surface_places.empty()) line += "; squares: the shots of the zig-zag, numbered";
+  if (std::ranges::any_of(in.findings, [](const Finding& f) { return f.place.has_value(); }))
+    line += "; red: what the audit has found, numbered as in report.html";
   return line + "; world coordinates";
 }
 
@@ -320,7 +336,8 @@ std::string overview_svg(const OverviewInput& in) {
     view.left = margin_px;
     view.top = layout.top(i);
     if (i < in.fields.size() && in.surface != nullptr) body += coloured_plate(in, in.fields[i], view, layout);
-    body += overlay(in, view, i == 0) + outline(in, view) + scale_bar(view, view.top + layout.plot_height);
+    body += overlay(in, view, i == 0) + outline(in, view) + marks(in, view) +
+            scale_bar(view, view.top + layout.plot_height);
   }
   y = layout.bottom() + letters_px;
   body += write(legend_line(in), letters_px, "");
@@ -329,7 +346,10 @@ std::string overview_svg(const OverviewInput& in) {
              "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {0:.0f} {1:.0f}' width='{0:.0f}' "
              "height='{1:.0f}'>\n"
              "<style>text{{font:{2}px sans-serif;fill:#111}}.title{{font-size:{3}px;font-weight:bold}}"
-             ".shot{{font-size:13px;text-anchor:middle;fill:#333}}svg{{display:block;margin:auto;max-width:"
+             ".shot{{font-size:13px;text-anchor:middle;fill:#333}}"
+             ".mark{{font-size:15px;font-weight:bold;fill:#c00;stroke:#fff;stroke-width:3px;paint-order:"
+             "stroke}}"
+             "svg{{display:block;margin:auto;max-width:"
              "100%;height:auto}}"
              "@page{{size:A4;margin:12mm}}@media print{{svg{{width:100%;max-height:270mm}}}}</style>\n"
              "<rect width='100%' height='100%' fill='#fff'/>\n",

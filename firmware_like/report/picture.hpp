@@ -5,6 +5,7 @@
 // Set-up and result time only: allocates.
 #pragma once
 
+#include "firmware_like/results/finding.hpp"
 #include "firmware_like/results/plate_field.hpp"
 #include "geometry/edges/outline.hpp"
 #include "geometry/splines/bspline.hpp"
@@ -25,7 +26,8 @@ struct OverviewInput {
   std::span<const Eigen::Vector2d> corners{};
   std::span<const tasks::ShotPlace> boundary_places{}, surface_places{};
   double field_x_mm = 102, field_y_mm = 102;
-  std::vector<PlateField> fields{};  // one panel each
+  std::vector<PlateField> fields{};     // one panel each
+  std::span<const Finding> findings{};  // those with a place are numbered as they come
 };
 
 std::string overview_svg(const OverviewInput&);

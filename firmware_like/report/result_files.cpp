@@ -59,6 +59,7 @@ std::string picture(const RunResult& r, std::vector<PlateField> fields) {
   in.field_x_mm = r.track.field_x_mm;
   in.field_y_mm = r.track.field_y_mm;
   in.fields = std::move(fields);
+  in.findings = r.findings;
   return overview_svg(in);
 }
 

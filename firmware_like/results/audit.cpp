@@ -121,27 +121,22 @@ void Audit::check_edge_points() {
   const double other_shape_mm =
       ragged_length > outline_.length_mm() / 2 ? std::max(smooth_rim_mm, 1.5 * teeth) : smooth_rim_mm;
   std::vector<Finding> named;
-  const geometry::OutlineDeviation* shape = nullptr;  // the farthest that is no matter of the rim
+  std::optional<std::size_t> shape;  // of those, the farthest that is no matter of the rim
   for (const auto& d : *deviations) {
     const bool rim = d.kind == Kind::ragged || d.kind == Kind::apart || d.kind == Kind::unseen;
     const double size = d.kind == Kind::unseen ? d.length_mm : d.distance_mm();
     const bool other_shape = !rim && size > other_shape_mm;
-    if (other_shape && (shape == nullptr || size > shape->distance_mm())) shape = &d;
+    if (other_shape && (!shape || size > named[*shape].size_mm)) shape = named.size();
     named.push_back({.kind = d.kind == Kind::ragged ? FindingKind::ragged_rim : FindingKind::outline,
                      .gravity = other_shape ? Gravity::untrusted : Gravity::warning,
                      .place = d.place,
                      .size_mm = size,
                      .text = std::string{tasks::words_of(d).view()}});
   }
-  if (shape != nullptr)
-    add({.kind = FindingKind::outline,
-         .gravity = Gravity::untrusted,
-         .place = shape->place,
-         .size_mm = shape->distance_mm(),
-         .text = fmt::format(
-             "the plate has not four smooth sides that meet in four corners: {}; its outline cannot "
-             "be told",
-             tasks::words_of(*shape).view())});
+  if (shape)
+    named[*shape].text = fmt::format(
+        "the plate has not four smooth sides that meet in four corners: {}; its outline cannot be told",
+        named[*shape].text);
   add_named(std::move(named), "places");
 }
 
