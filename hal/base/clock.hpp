@@ -27,13 +27,13 @@ class Clock {
   // An instant not far ahead at which something periodic should begin: now, where nothing else has its times.
   virtual Instant good_start() noexcept MOLDLOFT_NONBLOCKING { return now(); }
 
-  // What the calling thread has spent on the processor, from any origin: the difference of two readings, beside that of
-  // now(), tells how long the thread was ready and did not run. Costs more than now(). Where time is not real nobody
+  // Processor time of the calling thread, from any origin. Where it grows less than now() does, the
+  // thread waited or was ready and did not run. Costs more than now(). Where time is not real nobody
   // is ever preempted.
   virtual Duration thread_time() noexcept MOLDLOFT_NONBLOCKING { return now(); }
 
-  // Says that work of this declared cost has just been done. A real clock has seen it pass and ignores the call; a
-  // virtual clock moves by it, so that a simulated tick costs what its tasks declare.
+  // Says that work of this declared cost has just been done. A real clock has seen it pass and ignores the
+  // call. A virtual clock moves by it, so that a simulated tick costs what its tasks declare.
   virtual void charge(Duration) noexcept MOLDLOFT_NONBLOCKING {}
 };
 
@@ -44,8 +44,9 @@ class SteadyClock final : public Clock {
   Instant now() noexcept MOLDLOFT_NONBLOCKING override;
   void sleep_until(Instant wake) noexcept override;
   Duration thread_time() noexcept MOLDLOFT_NONBLOCKING override;
-  // The kernel does its own periodic work at whole multiples of 1, 4 or 10 ms of this clock, and whoever wakes then
-  // waits for it (5 us and more): within the next two milliseconds, half a one beside the whole.
+  // The kernel does its own periodic work at whole multiples of 1, 4 or 10 ms of this clock, and a thread
+  // that wakes then waits 5 us and more for it. So the instant lies within the next two milliseconds, half a
+  // one beside the whole.
   Instant good_start() noexcept MOLDLOFT_NONBLOCKING override;
 
  private:

@@ -1,5 +1,5 @@
-// What a driver has to say, in order, until it is asked. The cell takes one event a tick; a full queue drops
-// the newest and counts it, since an old event must not be overtaken by its own consequence.
+// What a driver has to say, in order, until it is asked. The cell takes one event a tick. A full queue drops
+// the newest and counts it: an old event must not be overtaken by its own consequence.
 //
 // Thread       one thread
 // Allocation   none

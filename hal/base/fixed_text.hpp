@@ -31,8 +31,8 @@ struct BasicTextPattern {
 template <typename... Args>
 using TextPattern = BasicTextPattern<std::type_identity_t<Args>...>;
 
-// How many of the first `size` bytes are whole characters of UTF-8, when the text goes on behind them: a character that
-// the cut goes through goes whole. Bytes that are no UTF-8 stay as they are.
+// How many of the first `size` bytes are whole characters of UTF-8, when the text goes on behind them. A
+// character that the cut divides is left out. Bytes that are no UTF-8 stay as they are.
 inline std::size_t whole_characters(const char* text, std::size_t size) noexcept MOLDLOFT_NONBLOCKING {
   for (std::size_t back = 1; back <= 3 && back <= size; ++back) {
     const auto byte = static_cast<unsigned char>(text[size - back]);

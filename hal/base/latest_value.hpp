@@ -1,5 +1,5 @@
-// The latest value of something, from one writer to any reader, without a lock (a sequence lock): the writer
-// never waits, a reader that was overtaken reads again.
+// The latest value of something, from one writer to any reader, without blocking (a sequence lock). The
+// writer never waits; a reader that was overtaken reads again.
 //
 // Thread       set(): one thread. get(): any.
 // Blocking     set() never; get() for as long as set() runs at the same moment

@@ -1,5 +1,6 @@
-// Text from outside (a device, a file's name, a configuration, an operator), made fit for a line that a person
-// reads and for every file that we write: valid UTF-8 without control characters, on one line, of bounded length.
+// Text from outside (a device, a file's name, a configuration, an operator), made printable: valid UTF-8
+// without control characters, on one line, of bounded length. People and every file that we write get
+// only such text.
 //
 //     tab and line end                       a blank
 //     other control characters, NUL too      ?

@@ -1,8 +1,9 @@
 // The control thread's promise, written so that tools can check it: no waiting, no lock, no heap.
 //
-// MOLDLOFT_NONBLOCKING stands on every function of the control path, between its parameters (const, noexcept) and
-// `override`. Clang's -Wfunction-effects then refuses to compile a call of anything that might wait or allocate, and
-// RealtimeSanitizer stops the program where such a function does so all the same. Other compilers see nothing.
+// MOLDLOFT_NONBLOCKING stands on every function of the control path, between its parameters (const,
+// noexcept) and `override`. Clang's -Wfunction-effects then refuses to compile a call of anything that might
+// wait or allocate. RealtimeSanitizer stops a program in which such a function does so all the same. Other
+// compilers see nothing.
 //
 // Two ways lead around these checks, each use with its reason beside it:
 //

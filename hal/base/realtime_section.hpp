@@ -1,6 +1,7 @@
-// Where the control thread keeps its promise: between begin() and end() it neither waits (but for the clock's own
-// sleep), nor locks, nor touches the heap. The mark does nothing by itself; guards read it. A library that is
-// preloaded into the deployed program (tests/realtime) finds it by its name among the program's symbols.
+// Where the control thread keeps its promise. Between begin() and end() it does not wait except in the
+// clock's own sleep, does not lock, and does not touch the heap. The mark does nothing by itself; guards
+// read it. A library that is preloaded into the deployed program (tests/realtime) finds it by its name among
+// the program's symbols.
 //
 // Thread       each has a mark of its own
 // Cost         begin() and end(): one store
@@ -21,9 +22,10 @@ class RealtimeSection {
   static bool inside() noexcept { return moldloft_realtime_section != 0; }
 };
 
-// While one lives, the promise is suspended: for closing a link that was lost and opening it again. libserialport
-// allocates there and reads sysfs, Asio locks its reactor, and no call tells them not to; the driver has reported the
-// loss, so the cell holds or aborts. A run says how often that was (suspensions()): a clean count cannot hide it.
+// While one lives, the promise is suspended: for closing a link that was lost and opening it again.
+// libserialport allocates there and reads sysfs, Asio locks its reactor, and neither can be told not to. The
+// driver has reported the loss, so the cell holds or aborts. A run says how often that was (suspensions()): a
+// clean count cannot hide it.
 class PromiseSuspended {
  public:
   PromiseSuspended() noexcept MOLDLOFT_NONBLOCKING;

@@ -1,6 +1,6 @@
-// State machines as tables: one row a transition, read by people, by the machine, by the test that proves
-// that every pair of state and event is either listed or explicitly ignored, and by the program that
-// draws the diagrams.
+// State machines as tables, one row a transition. People read them, and so do the machine, the program
+// that draws the diagrams, and a test. The test proves that every pair of state and event is either listed
+// or explicitly ignored.
 //
 // A machine is a pure function of (state, event, context): no clock, no input or output. Rows are tried in order; the
 // first whose guard agrees is taken. Guards are pure functions of the context, with the name that people read; the

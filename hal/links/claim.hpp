@@ -1,7 +1,7 @@
-// One process at a time has a device or a folder. A claim is a unix socket in the abstract namespace: it has no file,
-// belongs to no user, and goes with the process that holds it, however that ends, so none is ever stale. The kernel
-// knows whose it is. Processes in other network namespaces (containers) do not see it: what they can reach too, a
-// serial port or a folder, is locked by the kernel besides (serial_link.hpp, run_folder.hpp).
+// One process at a time has a device or a folder. A claim is a unix socket in the abstract namespace. It has
+// no file and belongs to no user. It ends with its process, however that ends, so no claim is ever stale. The
+// kernel knows whose it is. Processes in other network namespaces (containers) do not see it. What they can
+// reach too, a serial port or a folder, is locked by the kernel as well (serial_link.hpp, run_folder.hpp).
 //
 // Thread       any
 // Blocking     never

@@ -1,6 +1,6 @@
-// The flight recorder: the last second or so of ticks, always on, in a ring of fixed size. What goes wrong freezes
-// it a few ticks later, so that a dump shows what led there and what came of it; another thread writes the dump and
-// lets it run on.
+// The flight recorder: the last second or so of ticks, always on, in a ring of fixed size. A trigger freezes
+// it a few ticks later, so that a dump shows the causes and the consequences. Another thread writes the dump
+// and lets the recorder run on.
 //
 // Thread       name(), tick(), note(), transition(), trigger(): the control thread. frozen(), due(), dump(),
 //              thaw(): one other thread; dump() also from a signal handler, where it is the last thing that happens

@@ -1,6 +1,6 @@
 // A ring of records of any size between one writer and one reader: a record is there whole or not at all.
 //
-// A record takes 8 bytes of frame (kind and size) beside its own, rounded up to 8; records wrap around the
+// A record takes 8 bytes of frame (kind and size) beside its own, rounded up to 8. Records wrap around the
 // end, so the whole capacity is usable and room() is exact.
 //
 // Thread       write(), room(), high_water(): the writer. Reader: the one reader. used(), plan_bytes(): any.

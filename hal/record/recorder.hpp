@@ -1,5 +1,5 @@
-// The way from the control thread to the disk: two single-producer single-consumer rings of records, one
-// for the bulk of scanner bytes and one for everything else, so that a frame on its way can never crowd
+// The way from the control thread to the disk: two single-producer single-consumer rings of records. One
+// is for the bulk of scanner bytes, the other for everything else, so that a frame on its way never crowds
 // out an event.
 //
 // Thread       link_bytes(), event(), shot(), room_for_frame(): the control thread. drain(): one other thread, or the

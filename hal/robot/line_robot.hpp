@@ -3,9 +3,9 @@
 //     link open -> SYN -> STA -> POS -> ready -> MOV or CAL -> ACK -> DON -> ready
 //
 // The way through it is the table in line_table.cpp. A command has one number for its whole life and is
-// repeated as the same line until its fate is known; a robot that keeps PROTOCOLS.md moves once for a number,
-// however often it comes. What cannot be known that way (robot restarted, link gone for good) is never asked
-// again: the command is given up, and after SYN the cell learns from `ready` where the arm stands.
+// repeated as the same line until its fate is known. A robot that keeps PROTOCOLS.md moves once for a number,
+// however often it comes. When the fate cannot be known that way (robot restarted, link gone for good), the
+// command is given up and never repeated. After SYN the cell learns from `ready` where the arm stands.
 //
 // Thread, blocking, allocation, failure: as Robot says
 #pragma once

@@ -4,8 +4,9 @@
 // Thread       the control thread; receive() early in a tick, transmit() late in it
 // Blocking     never
 // Allocation   none after construction
-// Failure      a command is repeated on the wire until its fate is known, never issued under a second number: no fault
-//              of the link can move the arm twice; what the driver cannot mend comes out as an event
+// Failure      a command is repeated on the wire until its fate is known, never issued under a second
+//              number. So no fault of the link moves the arm twice. What the driver cannot mend is reported
+//              as an event
 #pragma once
 
 #include "hal/base/clock.hpp"

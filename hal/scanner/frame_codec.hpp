@@ -1,5 +1,5 @@
-// How the frames of one make of scanner lie in the bytes of its link. A run's store keeps those bytes and the codec's
-// name; whoever reads a stored run decodes by it and needs no driver.
+// How the frames of one make of scanner lie in the bytes of its link. A run's store keeps those bytes and the
+// codec's name; a stored run is decoded by it, without any driver.
 //
 // Thread       any; pure functions
 // Blocking     never

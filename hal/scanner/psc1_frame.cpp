@@ -56,9 +56,8 @@ struct Points {
   }
 };
 
-// Points first .. first + count - 1. A point that misses one coordinate misses all: half a point is none.
-// The results go through locals: stores through three pointers that might overlap would keep the compiler
-// from vector code.
+// Points first .. first + count - 1. A point that misses one coordinate is missing as a whole. The results go
+// through locals: stores through three pointers that might overlap would keep the compiler from vector code.
 template <std::size_t count>
 void decode_block(const Columns<std::int16_t>& from, std::size_t first, const FrameHead& head,
                   Frame& frame) noexcept {

@@ -523,7 +523,7 @@ void PscScanner::refuse(Instant now, const Message& why) {
   lose(now, why);
 }
 
-// A frame on its way keeps back whatever is said behind it.
+// A frame on its way keeps back everything behind it.
 Message PscScanner::why_no_frame() const {
   const auto limit_ms = settings_.frame_timeout / 1ms;
   if (incoming_.payload_offset == 0 || incoming_.head.type != Type::frame)

@@ -4,8 +4,9 @@
 // Thread       the control thread; receive() early in a tick, transmit() late in it
 // Blocking     never
 // Allocation   none after construction
-// Failure      the driver keeps the link alive by itself: it reconnects with back-off, greets and configures again, and
-//              repeats a request (at most twice) under its shot id; what it cannot mend comes out as an event
+// Failure      the driver keeps the link alive by itself: it reconnects with back-off, greets and configures
+//              again, and repeats a request at most twice under its shot id. What it cannot mend is reported
+//              as an event
 #pragma once
 
 #include "hal/base/clock.hpp"
@@ -59,18 +60,19 @@ class Scanner {
       MOLDLOFT_NONBLOCKING = 0;  // reads a bounded number of bytes and works on them
   virtual void transmit(Instant now) MOLDLOFT_NONBLOCKING = 0;  // time-outs, requests, heartbeats: bytes out
 
-  // Asks for one exposure. False unless state() is ready. Ids are chosen by the caller, not 0, each used for one
-  // exposure, also across restarts of the program: the scanner answers an id that it knows with the stored frame.
+  // Asks for one exposure. False unless state() is ready. The caller chooses the id: not 0, and for one
+  // exposure only, also across restarts of the program. The scanner answers an id that it knows with
+  // the stored frame.
   virtual bool trigger(std::uint32_t shot_id, Instant now) MOLDLOFT_NONBLOCKING = 0;
   virtual void forget_shot() MOLDLOFT_NONBLOCKING = 0;  // the cell no longer wants the outstanding shot
 
   virtual std::optional<ScannerEvent> next_event() MOLDLOFT_NONBLOCKING = 0;
   virtual ScannerState state() const MOLDLOFT_NONBLOCKING = 0;
   virtual const ScannerInfo& info() const MOLDLOFT_NONBLOCKING = 0;
-  // The last accepted one, valid until the next trigger(); after `arriving` the one that is on its way, which `frame`
-  // makes good and shot_failed or lost take back. A frame's lines are there from the first; its points come unpacked in
-  // pieces, so that a large frame does not take a tick of its own. A driver unpacks a whole frame by itself, slowly,
-  // where nobody asks.
+  // The last accepted one, valid until the next trigger(); after `arriving` the one that is on its way, which
+  // `frame` makes good and shot_failed or lost take back. A frame's lines are there at once. Its points are
+  // unpacked in pieces, so that a large frame does not fill a tick. A driver unpacks a whole frame by itself,
+  // slowly, where nobody asks.
   virtual const Frame& frame() const MOLDLOFT_NONBLOCKING = 0;
   virtual void unpack(std::size_t at_most_points) MOLDLOFT_NONBLOCKING = 0;
   virtual std::size_t unpacked() const
