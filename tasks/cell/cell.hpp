@@ -6,8 +6,8 @@
 // Thread       run() on the control thread; command() and progress() from anywhere
 // Blocking     never
 // Allocation   in the constructor only
-// Failure      what the cell can mend itself holds it until it is mended; what needs a person holds it for a person;
-//              what is dangerous aborts it. why() says which and what to do, in one line
+// Failure      a fault that the cell can mend itself holds it until then. A fault that needs a person holds
+//              it for a person. A dangerous one aborts it. why() says which and what to do, in one line
 #pragma once
 
 #include "hal/base/realtime.hpp"

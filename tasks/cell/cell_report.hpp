@@ -1,4 +1,4 @@
-// Where the cell stands, published once a tick for whoever shows it.
+// Where the cell stands, published once a tick for all who show it.
 //
 // Thread       publish() on the control thread; progress() from anywhere
 // Blocking     never

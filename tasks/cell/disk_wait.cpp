@@ -9,7 +9,8 @@ using namespace std::chrono_literals;
 
 namespace {
 
-// A disk that writes back what it has taken may stand for seconds; the arm stands meanwhile, and nothing is said.
+// A disk may stall for seconds while it writes back what it has taken. The arm stands meanwhile, and
+// nothing is reported.
 constexpr hal::Duration longest_without_room = 5s;
 
 // A path goes first where a message has no place for all of it: what is wrong stands at the end.

@@ -25,8 +25,9 @@ struct Workspace {
   int max_speed_percent = 100;
 };
 
-// How far from its target an arm that says it has arrived may stand. Arms settle within tenths of a millimetre; what
-// lies this far off is a wrong tool, a wrong frame, another convention of angles, or digits that the line has changed.
+// How far from its target an arm that says it has arrived may stand. Arms settle within tenths of a
+// millimetre. A pose this far off comes from a wrong tool, a wrong frame, another convention of angles, or
+// digits that the line has changed.
 struct Arrival {
   double distance_mm = 5, turn_rad = 2 * hal::degree;
 };

@@ -1,6 +1,5 @@
-// Shots that have been taken before: a run that is resumed or fitted again gets them from here instead of
-// from the devices, in the order in which they were taken, and goes through the same states as if they
-// had just arrived.
+// Shots that have been taken before. A run that is resumed or fitted again gets them from here instead of
+// from the devices, in their original order. It goes through the same states as if they had just arrived.
 //
 // Thread       the control thread; find() must not block or allocate (the shots are in memory before the run starts)
 #pragma once
@@ -27,8 +26,9 @@ class ShotArchive {
   virtual std::uint32_t last() const MOLDLOFT_NONBLOCKING = 0;
 };
 
-// Shot ids on the wire carry the shot's number in the run in their low bits and the run's epoch above: two runs, or one
-// run before and after a restart, never ask the scanner for the same id, so an old stored frame is never taken for new.
+// A shot id on the wire carries the shot's number in the run in its low bits, and the run's epoch above. So
+// two runs, or one run before and after a restart, never ask the scanner for the same id. An old stored frame
+// is never taken for new.
 constexpr std::uint32_t shot_number_bits = 12;
 constexpr std::uint32_t max_shot_number = (1u << shot_number_bits) - 1;
 constexpr std::uint32_t shot_number_of(std::uint32_t shot_id) { return shot_id & max_shot_number; }

@@ -1,14 +1,15 @@
 // One shot after another: drive there, expose, deliver; and the same from the archive of an earlier run. The table is
 // shot_sequence.hpp; this class carries its actions out.
 //
-// Who wants shots is the ShotUser: it orders one at a time, gets the frames, and says when the next may come.
+// The ShotUser is the part that wants shots. It orders one at a time, gets the frames, and says when the
+// next may come.
 //
 // Frames       world; poses mm and rad
 // Thread       the control thread
 // Blocking     never
 // Allocation   none
-// Failure      a shot that fails is taken again, and holds the cell after `max_attempts`; a target that the motion
-//              guard refuses in both turns of the head aborts it
+// Failure      a shot that fails is taken again, and holds the cell after `max_attempts`. A target that the
+//              motion guard refuses with the head turned either way aborts it
 #pragma once
 
 #include "hal/base/realtime.hpp"

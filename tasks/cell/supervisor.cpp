@@ -17,7 +17,7 @@ CellEvent most_urgent(unsigned commands) {
   return static_cast<CellEvent>(std::countr_zero(commands));
 }
 
-// A notice is read alone: who reads only that line learns which device it is about.
+// A notice is read alone, so the line itself says which device it is about.
 hal::Message named_by(HoldCause cause, const hal::Message& why) MOLDLOFT_NONBLOCKING {
   return cause == HoldCause::scanner ? why_not_ready("scanner", why) : why;
 }

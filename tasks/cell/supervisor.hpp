@@ -1,8 +1,8 @@
 // The supervisor: which of PackML's states the cell is in, what holds or aborts it, and what a person is told of that.
 // The table is cell_state.hpp; what entering a state sets off is carried out by the owner, at once.
 //
-// The parts of the cell know this class and not the cell: they ask it to hold or to abort, and tell it that what the
-// state does is done.
+// The parts of the cell know this class and not the cell. They ask it to hold or to abort, and tell it when a
+// state's work is done.
 //
 // Thread       the control thread; command() from anywhere; next_notice() on one other thread
 // Blocking     never

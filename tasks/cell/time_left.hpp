@@ -1,11 +1,11 @@
-// How long a run still takes, from the first shot on the plate's edge on: an estimate until the zig-zag is planned,
-// then the shots that are left at the pace of those before.
+// How long a run still takes, from the first shot on the plate's edge on. Until the zig-zag is planned it is
+// an estimate, then the remaining shots at the pace of those before.
 //
-// The tracker walks once round a point that lies on the plate, so the angle that it has swept about that point tells
-// how much of the outline is done, and the area that it has swept with it how much of the plate. The first shots say
-// little about that; until they say more, the plate is taken for a square about the start, of a size between what the
-// first edge's distance says and what is usual. The pace counts what was measured now: time in a hold, and shots of an
-// earlier run, do not.
+// The tracker walks once round a point that lies on the plate. The angle that it has swept about that point
+// tells how much of the outline is done; the area that it has swept tells how much of the plate. The first
+// shots say little about that. Until there are more, the plate is taken for a square about the start. Its
+// size lies between the usual one and the one that the first edge's distance suggests. The pace counts what
+// was measured now: time in a hold, and shots of an earlier run, do not.
 //
 // Thread       one thread
 // Blocking     never

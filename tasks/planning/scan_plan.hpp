@@ -1,6 +1,7 @@
-// The zig-zag: which shots cover the plate. The outline's bounding box, turned to the plate so that its area
-// is least, is cut into rows; each row holds as many shots as the outline is long there; every other row runs
-// backwards (thesis section 5.3.3, without its assumption that the plate lies along the axes).
+// The zig-zag: which shots cover the plate. The outline's bounding box, turned to the plate so that its
+// area is least, is cut into rows. Each row has as many shots as the outline is long there, and every
+// other row runs backwards. (This is the thesis's section 5.3.3, without its assumption that the plate
+// lies along the axes.)
 //
 // Frame        world, plan view, mm; the centre's height comes from the height model
 // Work         step() does one bounded piece: one side's samples, the box, one row; 25,000 instructions at most

@@ -1,5 +1,5 @@
-// What those outside may ask of a running cell, and tell it: plain values and commands. Whoever shows a cell to others,
-// or passes their commands on, knows this and not the cell.
+// What the outside may ask of a running cell, and tell it: plain values and commands. Any gateway that shows
+// a cell to others, or passes their commands on, knows this and not the cell.
 //
 // Thread       progress() and command() from anywhere; next_notice() on one thread
 // Blocking     never

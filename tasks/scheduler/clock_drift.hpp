@@ -30,8 +30,8 @@ class ClockDrift {
   std::optional<ClockDriftEstimate> estimate() const noexcept;
 
  private:
-  // Relative to the first pair, in seconds, and theirs less ours in microseconds: so that no digit of a day's
-  // nanoseconds is lost in the squares.
+  // Relative to the first pair, in seconds; theirs less ours in microseconds. So the squares lose no digit of
+  // a day's nanoseconds.
   hal::Instant first_ours_{0};
   std::uint64_t first_theirs_ = 0, pairs_ = 0;
   double sum_t_ = 0, sum_d_ = 0, sum_tt_ = 0, sum_td_ = 0, sum_dd_ = 0;

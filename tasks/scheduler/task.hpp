@@ -44,11 +44,11 @@ class BackgroundTask {
  public:
   virtual ~BackgroundTask() = default;
   virtual bool has_work() const MOLDLOFT_NONBLOCKING = 0;
-  // One bounded piece of work. `deadline` - now is the time left: a task that can work in slices fills it and
-  // returns before it; it is never nearer than the declared quantum.
+  // One bounded piece of work. `deadline` - now is the time left, never less than the declared quantum. A
+  // task that can work in slices fills it and returns before it.
   virtual void step(Instant deadline) MOLDLOFT_NONBLOCKING = 0;
-  // What kind of piece the next step is, 1 to step_kinds - 1, where the pieces of a kind cost alike: such a step runs
-  // if what its kind has been measured to take fits. Kind 0: only the declared quantum is certain.
+  // What kind of piece the next step is, 1 to step_kinds - 1, where the pieces of a kind cost alike. Such a
+  // step runs if the measured time of its kind fits. Kind 0: only the declared quantum is certain.
   virtual std::size_t next_kind() const MOLDLOFT_NONBLOCKING { return 0; }
 };
 inline constexpr std::size_t step_kinds = 8;

@@ -60,7 +60,7 @@ class ShotView {
  private:
   enum class Stage : std::uint8_t { cut, find, boundary, done };
   static constexpr std::size_t points_a_step = 2048, stripes_a_step = 8, runs_a_step = 16;
-  // Of the frame's points, from the first: those that are unpacked, by whomever, and those that the next cut needs.
+  // Counts of the frame's points, from the first: those unpacked so far, and those that the next cut needs.
   std::size_t points_here() const MOLDLOFT_NONBLOCKING;
   std::size_t points_wanted() const MOLDLOFT_NONBLOCKING;
   bool end() MOLDLOFT_NONBLOCKING;

@@ -1,9 +1,9 @@
 // The geometry that runs in the slack of the ticks: outline from the edge points, scan plan, plan map, surface fit. The
 // cell asks for the next piece of work and looks now and then whether it is done.
 //
-// Boundary shots come before the outline is known, so their points cannot be folded into the fit yet: every
-// n-th is kept in a reserve of fixed size (their number hardly matters: what a shot's points have in common,
-// the robot's error, does).
+// Boundary shots come before the outline is known, so their points cannot be folded into the fit yet. Every
+// n-th is kept in a reserve of fixed size. Their number hardly matters, since the robot's error is common to
+// all points of a shot.
 //
 // Thread       the control thread; step() is called by the scheduler in the slack
 // Work         step() does one bounded piece: a chunk of points, one pass over a side, one slice of the solution
