@@ -9,8 +9,9 @@
 
 namespace moldloft::firmware_like {
 
-// Parses; the program goes on when nothing comes back. Otherwise it ends with this exit code: help or version was
-// printed, or the line that says what is wrong. Commands and options that are misspelt are told with the nearest.
+// Parses; the program goes on when nothing comes back. Otherwise it ends with this exit code: help or
+// version was printed, or the line that says what is wrong. A misspelt command or option is answered with
+// the nearest one.
 std::optional<int> parse_command_line(CLI::App&, int argc, char** argv);
 
 }  // namespace moldloft::firmware_like

@@ -17,7 +17,7 @@
 namespace moldloft::firmware_like {
 namespace {
 
-// As it is told apart from other runs, whichever way it is named.
+// One path for a run, however it is named, so that runs can be told apart.
 std::string canonical_name(const std::string& run) {
   std::error_code failed;
   const auto place = std::filesystem::canonical(run, failed);

@@ -1,4 +1,4 @@
-// Numbers on the command line, with limits: what is refused is told with the option, what was given, what is allowed.
+// Numbers on the command line, with limits. A refusal names the option, the value given, and what is allowed.
 // A number stands alone and whole: "-1" for a count, "nan", "inf", "5mm" and "" are refused.
 //
 // Thread       the main thread, before anything is begun

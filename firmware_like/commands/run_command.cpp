@@ -32,7 +32,7 @@
 namespace moldloft::firmware_like {
 namespace {
 
-// A result's table is a courtesy: the run has to end whoever reads it.
+// A result's table is a courtesy: the run has to end whether it is read or not.
 constexpr auto patience_with_a_reader = std::chrono::seconds{5};
 
 std::string memory_line(const Controller& controller) {
@@ -187,7 +187,7 @@ RunConditions run_beside_threads(Controller& controller, const CellConfig& confi
   return conditions;
 }
 
-// Under the journal, for whoever watches it: on a terminal and in the report the timing says the same.
+// For readers of the journal; on a terminal and in the report the timing says the same.
 void warn_of_health(const RunResult& result) {
   if (!stderr_is_journal()) return;
   const std::string missed = missed_ticks_line(result.timing), lost = losses_line(result.timing);

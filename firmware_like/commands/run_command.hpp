@@ -11,8 +11,8 @@ struct RunOptions {
   std::string config_path;
   std::string out;  // empty: a new folder under out/
   bool resume = false;
-  // For a restart by a service manager: goes on with the run in `out` or begins it there, and either way comes up
-  // held, not connected to any device, until an operator says unhold over `control`.
+  // For a restart by a service manager. It resumes the run in `out` or begins it there. Either way it comes
+  // up held and connects to no device until an operator says unhold over `control`.
   bool resume_held = false;
   bool quiet = false;   // no progress: only what went wrong, and the run's last line
   std::string control;  // path of the operator's socket; empty: none

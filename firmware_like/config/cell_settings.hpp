@@ -1,5 +1,5 @@
-// What follows from the configuration for the cell and its background work: how many shots, edge points and spans the
-// largest plate can need, and how large the scanner's frames are.
+// What follows from the configuration for the cell and its background work. The largest plate decides how
+// many shots, edge points and spans can be needed; the scanner decides the size of its frames.
 //
 // Thread       any; pure
 #pragma once

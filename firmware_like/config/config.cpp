@@ -177,7 +177,7 @@ void flatten(const toml::table& table, const std::string& prefix, std::map<std::
   }
 }
 
-// Where every key stands: what no key can say alone is told with the line of one of them.
+// Where every key stands. A contradiction between keys is reported with the line of one of them.
 void note_lines(const toml::table& table, const std::string& prefix, std::map<std::string, int>& into) {
   for (const auto& [key, value] : table) {
     const std::string name = prefix + std::string{key.str()};
@@ -309,7 +309,7 @@ CellConfig default_config() {
   CellConfig c;
   c.scanner.tip_from_scanner = mount_from(default_mount_mm, default_mount_zyz_deg);
   c.start.centre << 500, 0, 10;
-  // A SCARA of 800 mm: a limit that is left out must be a limit all the same.
+  // The reach of a SCARA of 800 mm: a limit that is left out must still be a limit.
   c.robot.workspace = {.x_mm = {-800, 800},
                        .y_mm = {-800, 800},
                        .z_mm = {200, 600},

@@ -1,7 +1,8 @@
 // The cell's configuration: one TOML file a cell, every key explained in cell.example.toml beside this file.
 //
-// Strict on purpose: an unknown key, a wrong type, an impossible value or a contradiction is one line with file, line,
-// key and what is allowed, because a misspelt limit that silently keeps its default is how arms meet plates.
+// Strict on purpose, because a misspelt limit that silently keeps its default is how arms meet plates. An
+// unknown key, a wrong type, an impossible value or a contradiction gives one line with file, line, key and
+// what is allowed.
 #pragma once
 
 #include "firmware_like/config/config_rules.hpp"

@@ -20,17 +20,17 @@ inline constexpr std::array<tasks::TaskSpec, 6> task_table{{
     {.name = "health", .period_ticks = 100, .budget = 20us, .criticality = tasks::Criticality::ordinary},
 }};
 
-// The longest step, which seeks a corner on the whole boundary that a frame shows, takes 206 us on a processor of 500
-// million instructions a second (toolchain/cell-pc, whose gate holds all of them to the quantum). In virtual time a
-// step is charged what a small controller of today takes for it.
+// The longest step seeks a corner on the whole boundary that a frame shows. It takes 206 us on a processor of
+// 500 million instructions a second (toolchain/cell-pc, whose gate holds all steps to the quantum). In
+// virtual time a step is charged what a small controller of today takes for it.
 inline constexpr tasks::BackgroundSpec surface_work{.name = "surface", .quantum = 240us, .nominal = 12us};
 
-// Four steps of a controller of today, a quarter of one on the slowest: what runs longer makes the next tick late, and
-// a late tick of up to 100 us is none that is missed.
+// Four steps on a controller of today, a quarter of one on the slowest. A step that runs longer makes the
+// next tick late, but up to 100 us late does not count as missed.
 inline constexpr hal::Duration slack_guard = 50us;
 
-// The shortest tick that leaves room for the table, its guard time and one background step: with it no background
-// work can starve as long as the tasks keep their budgets.
+// The shortest tick that leaves room for the table, its guard time and one background step. As long as the
+// tasks keep their budgets, no background work can starve under it.
 inline constexpr hal::Duration shortest_tick =
     tasks::busiest_tick(task_table) + slack_guard + surface_work.quantum;
 // At 30 ticks within the robot's 3 s of silence the cell still answers in time.

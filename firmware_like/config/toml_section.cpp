@@ -16,7 +16,7 @@ constexpr std::size_t longest_text = 4095;
 
 constexpr std::size_t longest_label = 100;  // of a name: as much as a plate may be called by
 
-// Of a key or value that stands in a message: what is wrong with it comes behind, and must be seen.
+// A key or value as a message shows it, cut so that the complaint behind it is seen.
 std::string shown(std::string_view text) { return hal::printable(text, 60); }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// One table of a TOML file, read key by key: each getter notes what is wrong with its key, finish() also
-// notes keys that nobody asked for. Values keep their defaults where the key is absent.
+// One table of a TOML file, read key by key. Each getter notes what is wrong with its key; finish() notes the
+// keys that nobody asked for. Values keep their defaults where the key is absent.
 //
 // Setup time only: allocates. All errors of a file are collected, each with its line and key.
 #pragma once

@@ -1,5 +1,5 @@
-// A cell's devices, claimed before anything is sent to them: nobody else commands the arm or takes the scanner while
-// this process lives, connected or not.
+// A cell's devices, claimed before anything is sent to them. While this process lives, connected or not,
+// nobody else commands the arm or takes the scanner.
 //
 // Failure      one line that names the device and the process that has it
 #pragma once

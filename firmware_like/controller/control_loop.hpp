@@ -1,6 +1,6 @@
-// The control thread's loop on real devices: ticks from the start to the cell's rest. After the first ticks, in which
-// links are opened and pages touched, it stands in a RealtimeSection, and what the operating system does to the
-// thread is counted.
+// The control thread's loop on real devices: ticks from the start to the cell's rest. The first ticks open
+// links and touch pages. After them the loop runs in a RealtimeSection, and what the operating system does to
+// the thread is counted.
 //
 // Thread       the control thread
 // Blocking     as Controller::tick() says

@@ -19,7 +19,7 @@ tasks::CellSettings settings_for(const CellConfig& config, const ControllerOptio
   tasks::CellSettings s = cell_settings(config);
   s.epoch = options.epoch;
   s.devices = options.devices;
-  // Whoever can command the cell decides how long a lost scanner and a full disk are waited for.
+  // An operator who can command the cell decides how long it waits for a lost scanner or a full disk.
   if (options.attended) s.scanner_wait = s.disk_wait = hal::Duration::max();
   return s;
 }

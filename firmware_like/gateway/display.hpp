@@ -1,7 +1,7 @@
-// Progress for a person: one line that renews itself on a terminal and fits into it, one line a change where the
-// output is a file or a terminal that cannot renew a line (TERM=dumb). The ordinary thread that prints
-// progress_text.hpp. A run that ends before it has begun to measure leaves nothing behind here: the one line that says
-// why stands alone.
+// Progress for a person. On a terminal one line renews itself and fits the width. In a file, or on a terminal
+// that cannot renew a line (TERM=dumb), each change is a line. The ordinary thread that prints
+// progress_text.hpp. A run that ends before it has begun to measure leaves nothing behind here: the one line
+// that says why stands alone.
 #pragma once
 
 #include "firmware_like/gateway/progress_text.hpp"
@@ -17,7 +17,7 @@ namespace moldloft::firmware_like {
 
 // Whether the standard error is a terminal that can renew a line.
 bool renews_lines(int file, const char* term);
-// How many columns a terminal has: as it says now, or as COLUMNS says, or 80.
+// How many columns a terminal has: its own answer, else COLUMNS, else 80.
 std::size_t terminal_columns(int file, const char* columns);
 
 class DisplayThread {

@@ -198,7 +198,7 @@ std::string why_not_sent(const std::string& path, int why) {
   return fmt::format("{}: {}; {}", path, std::strerror(why), advice);
 }
 
-// Nobody has taken it up yet, and whoever takes it up later does it all the same.
+// Nobody has taken it yet, but it is carried out when it is taken later.
 bool waits_on(std::string_view word) {
   const auto event = command_named(word);
   return event && makes_safer(*event);

@@ -1,6 +1,7 @@
-// The operator's way to a cell that runs without a terminal: a unix datagram socket that takes one word a datagram and
-// answers in one line. Whoever may write to the socket's file may command the cell (its mode is 0660).
-// A word whose sender has gone away before it could be taken up is not carried out, unless it makes the cell safer.
+// The operator's way to a cell that runs without a terminal: a unix datagram socket. It takes one word a
+// datagram and answers with one line. The right to write to the socket's file is the right to command the
+// cell (its mode is 0660). A word whose sender has gone away before it could be taken up is not carried out,
+// unless it makes the cell safer.
 //
 //   start hold unhold stop abort clear reset      "done: Held -> Starting", or "refused: ..." and why
 //   status                                        one line of JSON

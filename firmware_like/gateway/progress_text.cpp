@@ -33,7 +33,7 @@ std::string left_text(const tasks::CellProgress& p) {
   return fmt::format("left about {:.0f} s", std::max(step, std::round(left / step) * step));
 }
 
-// What ends the run is said once, by its last line; what only holds it up is said here.
+// The last line of a run says what ended it; this line says what only holds it up.
 std::string held_up_by(const tasks::CellProgress& p) {
   const bool goes_on_by_itself =
       p.cause == tasks::HoldCause::scanner || p.cause == tasks::HoldCause::recorder;

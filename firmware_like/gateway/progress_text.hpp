@@ -1,5 +1,5 @@
-// What a person is told of a cell at work, as text: the line that renews itself on a terminal, the status for the
-// service manager, what is waited for, and what is noted. Pure functions.
+// A cell's progress as text for people: the line that renews itself on a terminal, the service manager's
+// status, what the cell waits for, and its notices. Pure functions.
 #pragma once
 
 #include "tasks/progress/cell_progress.hpp"
@@ -21,8 +21,8 @@ std::string awaited_text(const tasks::CellProgress&, const Surroundings& = {});
 
 // Time, state and phase, shots, what is left, what is waited for.
 std::string progress_line(const tasks::CellProgress&, const Surroundings& = {});
-// The same in so many columns at most: first it says things shorter, then it leaves out what matters least, at last it
-// is cut, never inside a character.
+// The same in so many columns at most. First the wording gets shorter, then the least important parts go, at
+// last the line is cut, never inside a character.
 std::string progress_line_within(std::size_t columns, const tasks::CellProgress&, const Surroundings& = {});
 
 // Without the time that passes, and with what a person has to see to: it changes when something happens.

@@ -1,5 +1,5 @@
-// The ordinary thread that looks at the control loop every 100 ms for as long as it lives (service_watch.hpp), and
-// hands what the cell has noted to the journal, where standard error is one.
+// An ordinary thread that looks at the control loop every 100 ms for as long as it lives (service_watch.hpp).
+// Where standard error is the journal, it also writes the cell's notices there.
 #pragma once
 
 #include "firmware_like/gateway/progress_text.hpp"

@@ -1,6 +1,7 @@
-// Watches the control loop from outside and keeps the service manager informed: its watchdog is fed only while the
-// loop's heartbeat advances. When it does not, the task that the loop stands in is named, on stderr, in the status and
-// in a file of the run's folder, and feeding ends: after the manager's kill the culprit is known.
+// Watches the control loop from outside and keeps the service manager informed: its watchdog is fed only
+// while the loop's heartbeat advances. When it does not, feeding ends, and the task in which the loop
+// hangs is named: on stderr, in the status and in a file of the run's folder. So the culprit is known
+// after the manager's kill.
 //
 // Thread       one ordinary thread (service_thread.hpp)
 // Blocking     writes one small file when the loop stands
@@ -29,8 +30,8 @@ struct LoopSight {
 
 class ServiceWatch {
  public:
-  // Looks come at this distance. Time between two looks counts as no more than twice this: when the whole program was
-  // stopped (by a debugger, a suspended machine), the loop is not to blame.
+  // Looks come at this distance. Time between two looks counts as no more than twice this. When the whole
+  // program was stopped (by a debugger, a suspended machine), the loop is not to blame.
   static constexpr hal::Duration period = std::chrono::milliseconds{100};
 
   ServiceWatch(ServiceNotify&, std::filesystem::path report);

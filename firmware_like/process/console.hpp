@@ -1,5 +1,5 @@
-// What a person reads: lines on standard error, a command's answer on standard output. Nobody's reading, or not
-// reading, ends the program or holds it up for long: a journal that has gone, a full disk under the log, a closed
+// What a person reads: lines on standard error, a command's answer on standard output. No reader, present or
+// absent, ends the program or holds it up for long: a lost journal, a full disk under the log, a closed
 // terminal, a pipe that nobody empties.
 //
 // Thread       open_console() first of all in main(); say() and unsaid() anywhere but the control thread; the rest on
@@ -16,9 +16,9 @@
 
 namespace moldloft::firmware_like {
 
-// Descriptors 0 to 2 are opened on /dev/null where they are closed, so that no run store and no serial port gets one
-// of their numbers and is written to as if it were a terminal. A pipe without a reader and a file beyond its limit
-// are errors of a write from now on, no longer signals that kill.
+// Descriptors 0 to 2 are opened on /dev/null where they are closed. Otherwise a run store or a serial port
+// would get one of their numbers and be written to like a terminal. A pipe without a reader and a file beyond
+// its limit are errors of a write from now on, no longer signals that kill.
 void open_console();
 
 // Text for a person on standard error, as it stands. When it cannot be written within a second it is dropped and

@@ -1,5 +1,5 @@
-// Priorities for the system's journal. systemd reads a line's "<4>" as its priority when standard error is the journal
-// (sd-daemon(3)); anywhere else a person would see the mark, so nothing is marked there.
+// Priorities for the system's journal. When standard error is the journal, systemd reads a line's "<4>" as
+// its priority (sd-daemon(3)). Anywhere else a person would see the mark, so nothing is marked there.
 //
 // Allocation   yes
 #pragma once

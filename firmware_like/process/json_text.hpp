@@ -1,5 +1,5 @@
-// JSON as text, the only place that writes it: dump() of the library throws where a string is no UTF-8, in the
-// middle of what ends a run. Here such bytes become U+FFFD, and the file is JSON all the same.
+// JSON as text, the only place that writes it. The library's dump() throws when a string is not UTF-8, and
+// would do so while a run is being saved. Here such bytes become U+FFFD, and the file is still JSON.
 #pragma once
 
 #include <nlohmann/json.hpp>

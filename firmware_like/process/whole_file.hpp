@@ -1,5 +1,5 @@
-// Files written as a whole, by everything that writes: a reader finds the old content or the new, never half of it, and
-// a full disk leaves the old.
+// Files written as a whole; everything that writes files does it here. A reader finds the old content or the
+// new, never half of it, and a full disk leaves the old.
 //
 // A link is followed and stays; the file behind it keeps its mode. What is no regular file (a device, a pipe,
 // /dev/stdout) is written into, never replaced. A folder that is missing is not made.

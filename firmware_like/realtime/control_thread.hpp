@@ -4,7 +4,8 @@
 // Thread       constructed, begun and joined by one ordinary thread
 // Blocking     the constructor waits until the thread has set itself up; join() until the loop has ended
 // Allocation   at construction only
-// Failure      what the set-up could not have is in setup(); std::system_error when no thread can be had at all
+// Failure      setup() lists the settings that were refused; std::system_error when no thread can be
+//              started at all
 #pragma once
 
 #include "firmware_like/realtime/process_setup.hpp"

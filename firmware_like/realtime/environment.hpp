@@ -1,6 +1,6 @@
-// The machine that a timing report speaks of: what decides whether its figures mean anything, read from the files in
-// which the kernel says so, and the verdict. A report without it has been taken for a defect of the program more than
-// once where the kernel or the governor was at fault.
+// The machine that a timing report is about. What decides whether its figures mean anything is read from the
+// kernel's files, and judged. A report without it has been taken for a defect of the program more than once
+// where the kernel or the governor was at fault.
 //
 // Thread       any ordinary one
 // Blocking     yes: reads some dozen small files

@@ -1,6 +1,6 @@
 // What the control thread needs of the operating system to keep its deadlines: asked for once, read back from
-// the kernel, reported as rows. Nothing of it is required: what could not be had is a row that says so and
-// how to get it, and the run goes on.
+// the kernel, reported as rows. No setting is required. Of a setting that the system refuses, a row says so
+// and how to get it, and the run goes on.
 //
 // Thread       ProcessSetup: before the threads are started. set_up_control_thread(): on the control thread itself, and
 //              no other thread gets anything of it

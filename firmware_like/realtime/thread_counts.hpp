@@ -19,8 +19,8 @@ struct ThreadCounts {
   std::uint64_t ticks = 0;
   std::uint64_t minor_faults = 0;  // a page that was in memory, but not yet mapped
   std::uint64_t major_faults = 0;  // a page that had to be read from disk
-  // A thread that only sleeps to its ticks gives its CPU away at most once a tick of its own accord: more than `ticks`
-  // means that it waited for something else.
+  // A thread that only sleeps to its ticks gives its CPU away at most once a tick. More than `ticks` means
+  // that it waited for something else.
   std::uint64_t voluntary_switches = 0;
   std::uint64_t involuntary_switches = 0;  // another thread took the CPU away
   std::uint64_t migrations = 0;            // ticks that began on another CPU than the one before

@@ -1,5 +1,5 @@
-// A flight recorder's dump as text, one line a tick: when it was woken and how late, a picture of the tick, the
-// costs, the bytes of the links, the transitions.
+// A flight recorder's dump as text, one line a tick. It shows the wake-up and its lateness, a picture of the
+// tick, the costs, the bytes of the links, and the transitions.
 //
 //         time s   late us  0                                   1000 us
 //      12.345678       3.1  13~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~~....   surface 71 x, longest 13  scanner 1460 in

@@ -1,5 +1,5 @@
-// The overview of a run as SVG: the plate in plan view, once with its shape in colour, once with
-// the deviation, each with a scale; over them the outline, the tracker's path and the shots.
+// The overview of a run as SVG: the plate in plan view, once with its shape and once with its
+// deviation in colour, each with a scale. Over both lie the outline, the tracker's path and the shots.
 // World coordinates, mm.
 //
 // Set-up and result time only: allocates.

@@ -1,5 +1,5 @@
-// The flight recorder's dumps in a run's folder: flight-01.bin and on, each written by an ordinary thread when the ring
-// has frozen; flight-crash.bin, written by a signal handler when the program dies.
+// The flight recorder's dumps in a run's folder. An ordinary thread writes flight-01.bin and on, each when
+// the ring has frozen. A signal handler writes flight-crash.bin when the program dies.
 //
 // Thread       FlightFiles: the ordinary thread that owns it. CrashDump: constructed and destroyed on one ordinary
 //              thread while no other is; its handler runs wherever the signal comes

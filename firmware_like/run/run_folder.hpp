@@ -62,12 +62,12 @@ std::expected<RunFolder, Failure> resume_run(const std::filesystem::path&, const
                                              const RunNames& = {});
 std::expected<RunFolder, Failure> open_run(const std::filesystem::path&);  // to read only
 
-// Whoever removed the run's folder or its store while the store was open has not removed what is in it: both are made
-// again. Whether that was needed.
+// Makes the run's folder and its store again when somebody has removed them; the open store still holds the
+// data. Returns whether that was needed.
 std::expected<bool, Failure> bring_back(const RunFolder&);
 
-// Takes a run away that was refused before anything was measured, so that it does not block the next try: its
-// store, and the folder if it was made for it and holds nothing else.
+// Removes a run that was refused before anything was measured, so that it does not block the next try. It
+// removes the store, and the folder too if it was made for the run and holds nothing else.
 void discard_run(RunFolder);
 
 // When the run began, UTC; empty where its store does not know.

@@ -1,8 +1,9 @@
-// What keeps the controller busy while its timing is measured without devices: the loads of a cell at their heaviest.
-// A made-up plate is measured again and again out of frames that were made beforehand: the plate found in every
-// frame, the outline built, all points folded, the surface solved, with no pause between two plates, so that the
-// slack of every tick has work. Meanwhile frames come in at the pace of a scanner on a 100 Mb/s link, through the tap
-// that records them, and are decoded. Bookkeeping of the cell and the robot's line need a cell; they are not here.
+// What keeps the controller busy while its timing is measured without devices: the loads of a cell at their
+// heaviest. A made-up plate is measured again and again from prepared frames. The plate is found in every
+// frame, the outline built, all points folded, and the surface solved. No pause comes between two plates, so
+// that the slack of every tick has work. Meanwhile frames come in at the pace of a scanner on a 100 Mb/s
+// link, through the tap that records them, and are decoded. Bookkeeping of the cell and the robot's line need
+// a cell; they are not here.
 //
 // Thread       the constructor anywhere, the scheduler's tasks on the control thread; recorder().drain() on one other
 // Blocking     never
