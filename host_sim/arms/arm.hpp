@@ -1,5 +1,5 @@
-// What the simulation asks of a robot arm: four joints, a tip whose z axis points straight down, poses as the
-// robot's wire writes them (tip in world, V+'s ZYZ' angles, pitch 180 degrees).
+// What the simulation asks of a robot arm. It has four joints, and a tip whose z axis points straight down.
+// Poses are as on the robot's wire (tip in world, V+'s ZYZ' angles, pitch 180 degrees).
 //
 // A new make of arm is one more of these; what moves it (arm_drive.hpp) knows only this.
 //

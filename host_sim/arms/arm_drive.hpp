@@ -1,5 +1,5 @@
-// An arm in motion: where it stands, where it is going, how long it takes, and how far from where it believes
-// to be it truly is.
+// An arm in motion: where it stands, where it is going, how long it takes, and how far its true place is from
+// the one that it believes.
 //
 // Motion is joint-interpolated with a trapezoid of speed; after it the arm settles. At each stop errors are
 // drawn anew (repeatability); on the way they pass over from the old to the new. What the controller of the

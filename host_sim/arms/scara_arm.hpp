@@ -1,8 +1,8 @@
 // A SCARA arm of the Adept One's size: joints 1 and 2 turn links of 425 and 375 mm in the plane, 3 moves the
 // quill, 4 turns the flange. Joint 3 is counted as the tip's height over the world's z = 0.
 //
-// Limits: Adept One class (j1 +-150, j2 +-147, j4 +-277 degrees, stroke 195 mm); speeds and accelerations are
-// what one gives an arm that carries a scanner, a third of what the arm could.
+// Limits: Adept One class (j1 +-150, j2 +-147, j4 +-277 degrees, stroke 195 mm). Speeds and accelerations are
+// those for carrying a scanner, a third of what the arm could do.
 #pragma once
 
 #include "host_sim/arms/arm.hpp"

@@ -22,9 +22,9 @@ double distance_to_outline(PlanPoints, const Eigen::Vector2d&) noexcept;
 
 // The convex hull, counter-clockwise. Cost n log n.
 
-// The four hull vertices that span the quadrilateral of largest area, counter-clockwise, beginning with the
-// one of smallest x + y: what one calls the corners of an approximately four-sided outline. Cost quadratic in
-// the hull's vertices.
+// The corners of an approximately four-sided outline: the four hull vertices that span the
+// quadrilateral of largest area. They go counter-clockwise from the one of smallest x + y. Cost
+// quadratic in the hull's vertices.
 std::array<Eigen::Vector2d, 4> largest_quadrilateral(PlanPoints);
 
 // Points along the closed outline, at most `step_mm` apart, all vertices among them.

@@ -1,5 +1,5 @@
-// Logarithm, sine and cosine from additions, multiplications and divisions alone. The C library picks its own
-// variants by processor and version and they differ in the last bit; these do not, so that a seed means the
+// Logarithm, sine and cosine from additions, multiplications and divisions alone. The C library picks
+// variants by processor and version, and they differ in the last bit. These do not, so that a seed means the
 // same noise and the same plate on every machine.
 //
 // Accuracy     4 eps relative for the logarithm; 2 eps absolute for sine and cosine, |x| <= 1e5

@@ -2,8 +2,8 @@
 // Gaussian by Marsaglia's polar method. Nothing of the standard library's distributions, whose values are
 // each vendor's own: a seed means the same numbers everywhere.
 //
-// A stream is named by (seed, stream, index), for instance (seed, optics, exposure 17): what one device draws
-// does not depend on what another has drawn before.
+// A stream is named by (seed, stream, index), for instance (seed, optics, exposure 17). So what one device
+// draws does not depend on what another has drawn.
 #pragma once
 
 #include "host_sim/base/portable_math.hpp"

@@ -1,10 +1,10 @@
 // What a simulated cell consists of, as one chooses it: plate, arm, scanner, mount, seed. Defaults are
 // the thesis's cell.
 //
-// The seed draws where the plate lies: its centre of area within 30 mm (x) and 60 mm (y) of the middle of the
-// cell, less for small plates so that the scanner's start over the middle sees plate everywhere, turned by
-// any angle. A placement is drawn again until the arm can bring the field of view over all of the outline,
-// and 20 mm beyond it, with stripes in any direction.
+// The seed draws where the plate lies, turned by any angle. Its centre of area is within 30 mm (x) and 60 mm
+// (y) of the middle of the cell. For small plates it is nearer, so that the scanner's start over the middle
+// sees plate everywhere. A placement is drawn again until the arm reaches all of it: the field of view over
+// all of the outline and 20 mm beyond, with stripes in any direction.
 //
 // A stripe direction can be had from two headings half a turn apart. With the scanner 140 mm off the flange a
 // SCARA reaches every direction, by one of the two, where the field's centre is 185 to 787 mm from the base

@@ -1,6 +1,6 @@
-// A byte link at the speed of the wire that it stands for. A loopback socket moves a frame in a millisecond
-// and a pseudo-terminal a line at once; a scanner on 100 Mb/s takes 24 ms for the one, a robot on 115200 baud
-// 5 for the other.
+// A byte link at the speed of the wire that it stands for. A loopback socket moves a frame in a millisecond,
+// and a scanner on 100 Mb/s takes 24 ms for it. A pseudo-terminal moves a line at once, and a robot on 115200
+// baud takes 5 ms for it.
 //
 // Thread       as ByteLink says
 // Blocking     as ByteLink says

@@ -1,8 +1,9 @@
 // The robot's program as a device: serves the line protocol (hal/PROTOCOLS.md) on a byte link, sans-IO, and
 // drives the simulated arm.
 //
-// At most once: a number that was seen never moves the arm again; asked again it brings ACK while the arm moves, and
-// the stored DON or ERR after. After power-up, watchdog or e-stop numbered lines are refused until SYN.
+// At most once: a number that was seen never moves the arm again. Asked again, it brings ACK while the arm
+// moves, and afterwards the stored DON or ERR. After power-up, watchdog or e-stop numbered lines are
+// refused until SYN.
 //
 // Thread       one thread; step() as often as time is looked at
 // Blocking     never

@@ -1,5 +1,5 @@
-// A simulated scanner of any make, as the world sees it: it serves its protocol on a byte link, looks at
-// a scene, and says what it is doing.
+// A simulated scanner of any make, as the world sees it. It serves its protocol on a byte link, looks at a
+// scene, and says what it is doing.
 //
 // Thread       one thread; step() as often as time is looked at
 // Blocking     never

@@ -1,8 +1,8 @@
 // A byte link over TCP from the server's side: one client at a time on a loopback port; a new
 // client replaces the one before.
 //
-// open() listens; the state is `opening` until a client has connected, `open` while it is there, `lost` when
-// it has gone; open() again waits for the next one.
+// open() listens. The state is `opening` until a client has connected, `open` while it is there, `lost` when
+// it has gone. Another open() waits for the next one.
 //
 // Thread       as ByteLink says
 // Blocking     as ByteLink says

@@ -15,8 +15,8 @@ enum class LengthUnit { millimetre, centimetre, metre, inch };
 double millimetres_in(LengthUnit);
 std::expected<LengthUnit, SimError> unit_named(std::string_view);  // mm, cm, m, inch or in
 
-// A plate whose longer side is outside these has been read in the wrong unit: less cannot be tracked with a field of
-// 102 mm, and no mill rolls more.
+// A plate whose longer side is outside these limits was read in the wrong unit. A smaller one cannot be
+// tracked with a field of 102 mm, and no mill rolls a larger one.
 constexpr double shortest_plate_mm = 60, longest_plate_mm = 20'000;
 
 // When a plate of a x b mm, read in `given`, cannot be right: what is wrong and which unit would make a plate of it.

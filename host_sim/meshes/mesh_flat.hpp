@@ -16,8 +16,8 @@
 
 namespace moldloft::host_sim {
 
-// Turns the mesh so that its best-fit plane is horizontal, its normals point up and its long side lies along x, and
-// moves it so that the middle of its bounding box is the origin in plan.
+// Turns the mesh so that its best-fit plane is horizontal, its normals point up and its long side lies along
+// x. Then moves the middle of its bounding box to the origin in plan.
 void lay_flat(TriangleMesh&);
 
 struct FlatSheet {

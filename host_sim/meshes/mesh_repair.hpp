@@ -18,8 +18,8 @@
 
 namespace moldloft::host_sim {
 
-// Seams are welded up to a thousandth of the mesh's typical (median) edge, yet at least 0.002 mm where that is no more
-// than a hundredth of the edge, and never more than 0.05 mm.
+// Seams are welded up to a thousandth of the mesh's typical (median) edge. The width is at least 0.002 mm
+// where that is no more than a hundredth of the edge, and never more than 0.05 mm.
 double seam_tolerance_mm(double typical_edge_mm);
 
 struct MeshRepairs {

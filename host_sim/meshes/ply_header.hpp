@@ -1,7 +1,7 @@
 // The head of a PLY file: its form, and the elements and properties that its body holds, in the file's own order.
 //
-// Keywords, types and names are taken in any case and come out in small letters; lines end with LF, CRLF or CR;
-// comments and obj_info stand anywhere.
+// Keywords, types and names are taken in any case and come out in small letters. Lines end with LF, CRLF or
+// CR. Comments and obj_info may stand anywhere.
 #pragma once
 
 #include "host_sim/base/sim_error.hpp"

@@ -1,5 +1,6 @@
-// Reads a surface from the bytes of a PLY file: ascii and binary of either byte order, numbers and lists of every type,
-// faces of any number of corners, triangle strips, elements in any order; whatever else the file holds is passed over.
+// Reads a surface from the bytes of a PLY file, ascii or binary of either byte order. It takes numbers and
+// lists of every type, faces of any number of corners, triangle strips, and elements in any order. All else
+// in the file is passed over.
 //
 // Unit         the file's own
 // Cost         linear; memory follows the bytes that are there, never the counts that the header announces

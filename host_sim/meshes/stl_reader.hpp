@@ -1,5 +1,6 @@
-// Reads a surface from the bytes of an STL file, text or binary: told apart by the bytes, since a binary one may begin
-// with "solid" too. Several solids of a text are one surface. Normals are passed over: the corners' order tells them.
+// Reads a surface from the bytes of an STL file, text or binary. The bytes themselves tell which, since a
+// binary one may begin with "solid" too. Several solids of a text are one surface. Normals are passed over:
+// the corners' order tells them.
 //
 // Unit         the file's own; STL names none
 // Cost         linear; memory follows the bytes that are there

@@ -1,9 +1,10 @@
 // The scanner's eye: laser planes cast on the plate, its side walls and the table, seen by cameras.
 //
-// Scanner coordinates as hal/scanner/frame.hpp says. The projector stands at (0, 0, H) over the centre of the field;
-// laser plane i passes through x_i, ray j of it through y_j at z = 0, both at the middles of equal parts of
-// the field. A point is measured if the ray meets it first, it lies within +-depth of z = 0, and at least one
-// camera sees it: what the plate hides from all cameras is shadow. Noise moves a point along its ray.
+// Scanner coordinates as hal/scanner/frame.hpp says. The projector stands at (0, 0, H) over the centre of the
+// field. Laser plane i passes through x_i, and its ray j through y_j at z = 0. Both lie at the middles of
+// equal parts of the field. A point is measured if the ray meets it first, if it lies within +-depth of z =
+// 0, and if at least one camera sees it. What the plate hides from all cameras is shadow. Noise moves a point
+// along its ray.
 //
 // Frame        in: world_from_scanner, mm; out: scanner coordinates, mm
 // Cost         a frame of 100 x 500 rays 5 to 10 ms

@@ -1,9 +1,9 @@
 // Rays against a plate with thickness lying on a table, in plate coordinates (mm).
 //
 // The plate is a solid: its top surface inside the outline, the same surface lower by the thickness, and
-// vertical walls between. Rays are much steeper than the plate (the height over the surface falls, or rises,
-// all along a ray); under that condition what is hit first is exact, including a wall's foot, the space under
-// a raised edge and corners.
+// vertical walls between. Rays are much steeper than the plate: the height over the surface falls, or rises,
+// all along a ray. Under that condition the first hit is exact, including a wall's foot, the space under a
+// raised edge, and corners.
 //
 // Cost         a ray away from edges 3 height samples; each edge near it 5 ns
 // Allocation   none after reserve()
