@@ -292,3 +292,13 @@ TEST_CASE("where most of the rim is ragged its teeth are warnings and no other s
   CHECK(r.outcome == Outcome::warned);
   CHECK(says(found(r.findings, FindingKind::ragged_rim), "a ragged rim, up to 4"));
 }
+
+TEST_CASE("shots that all scatter a little in height are told together") {
+  RunResult r = MadeUpRun{}.result();
+  r.measured->fit.shot_offset_rms_mm = 0.019;
+  CHECK(audit(r).empty());
+  r.measured->fit.shot_offset_rms_mm = 0.022;
+  CHECK(says(found(audit(r), FindingKind::shot_heights), "scatter 0.022 mm rms"));
+  r.promised.repeatability_z_mm = 0.02;
+  CHECK(audit(r).empty());
+}
