@@ -28,7 +28,7 @@ constexpr double smallest_unseen_mm2 = 16;
 constexpr double smallest_swing_mm = 0.25;
 constexpr std::size_t most_named = 8;  // of one kind; the rest is counted
 
-// Standard deviation of an edge's place: its spacing, and where the arm stands in plan. On good plates, in 300 runs on
+// Standard deviation of an edge's place: its spacing, and where the arm stands in plan. On good plates, in 192 runs on
 // both arms, the median of a shot's edges lies within 0.15 mm of the outline.
 constexpr double edge_sigma_mm = 0.1;
 constexpr double edges_agree_mm = 0.4;
@@ -36,8 +36,8 @@ constexpr double edges_agree_mm = 0.4;
 constexpr double contradiction = 5;
 // The scatter of points about the surface, as a share of the scanner's noise, that is neither too much nor too little.
 constexpr double most_noise = 1.5, least_noise = 0.5;
-// The rms of so many shots or more is good to a sixth; on good plates, 300 runs, it stays below 1.45 times what the arm
-// promises.
+// The rms of so many shots or more is good to a sixth. On good plates it stays below 1.45 times what the arm promises
+// (192 runs).
 constexpr std::size_t few_shots = 10;
 constexpr double most_repeatability = 1.6;
 // A model explains the shots' disagreement when it takes away so much of its square.

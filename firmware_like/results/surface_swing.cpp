@@ -9,10 +9,11 @@
 namespace moldloft::firmware_like {
 namespace {
 
-constexpr double step_mm = 3;         // along the outline
-constexpr double inset_mm = 0.5;      // of the places looked at, from the outline
-constexpr double apart_mm = 50;       // swings nearer to each other are one
-constexpr double bucket_mm = 10;      // of the points
+constexpr double step_mm = 3;     // along the outline
+constexpr double inset_mm = 0.5;  // of the places looked at, from the outline
+constexpr double apart_mm = 50;   // swings nearer to each other are one
+constexpr double bucket_mm = 10;  // of the points
+constexpr std::size_t few_points = 5;
 constexpr int farthest_bucket = 12;   // beyond that nothing is near
 constexpr double usual_share = 0.95;  // of the bends where the plate was seen: what is usual
 
@@ -24,25 +25,25 @@ class PointsByPlace {
     for (const auto& p : evidence.samples) add(p);
   }
 
-  std::optional<Eigen::Vector3d> nearest(const Eigen::Vector2d& to) const {
-    std::optional<Eigen::Vector3d> best;
-    double least = std::numeric_limits<double>::infinity();
+  // The nearest few, the nearest first; fewer where no more are near.
+  std::vector<Eigen::Vector3d> nearest(const Eigen::Vector2d& to) const {
+    std::vector<Eigen::Vector3d> found;
+    const auto distance = [&](const Eigen::Vector3d& p) { return (p.head<2>() - to).norm(); };
     const int column = index(to.x()), row = index(to.y());
     for (int ring = 0; ring <= farthest_bucket; ++ring) {
-      if (least <= (ring - 1) * bucket_mm) break;
+      // What lies in this ring and beyond is no nearer than what is there already.
+      if (found.size() >= few_points && distance(found[few_points - 1]) <= (ring - 1) * bucket_mm) break;
       for (int dy = -ring; dy <= ring; ++dy) {
         for (int dx = -ring; dx <= ring; ++dx) {
           if (std::max(std::abs(dx), std::abs(dy)) != ring) continue;
           const auto at = buckets_.find(key(column + dx, row + dy));
-          if (at == buckets_.end()) continue;
-          for (const auto& p : at->second) {
-            const double distance = (p.head<2>() - to).norm();
-            if (distance < least) least = distance, best = p;
-          }
+          if (at != buckets_.end()) found.insert(found.end(), at->second.begin(), at->second.end());
         }
       }
+      std::ranges::sort(found, {}, distance);
     }
-    return best;
+    if (found.size() > few_points) found.resize(few_points);
+    return found;
   }
 
  private:
@@ -63,15 +64,21 @@ class Swings {
   std::optional<SurfaceSwing> at(const Eigen::Vector2d& place, double limit_mm) const {
     const auto here = on_surface(place);
     const auto near = points_.nearest(place);
-    if (!here || !near) return std::nullopt;
-    const auto there = on_surface(near->head<2>());
-    if (!there) return std::nullopt;
-    const Eigen::Vector2d way = place - near->head<2>();
-    const double expected = near->z() + slope(*there).dot(way);
-    const double above = here->value.z() - expected;
-    const double allowed = limit_mm + bend_ * way.squaredNorm() / 2;
-    if (std::abs(above) <= allowed) return std::nullopt;
-    return SurfaceSwing{.place = place, .height_mm = above, .from_points_mm = way.norm()};
+    if (!here || near.empty()) return std::nullopt;
+    // The median of a few: any one of them may be an outlier.
+    std::vector<double> above;
+    for (const auto& p : near) {
+      const auto there = on_surface(p.head<2>());
+      if (!there) continue;
+      above.push_back(here->value.z() - p.z() - slope(*there).dot(place - p.head<2>()));
+    }
+    if (above.empty()) return std::nullopt;
+    const auto middle = above.begin() + static_cast<std::ptrdiff_t>(above.size() / 2);
+    std::ranges::nth_element(above, middle);
+    const double away = (near.back().head<2>() - place).norm();
+    if (std::abs(*middle) <= limit_mm + bend_ * away * away / 2) return std::nullopt;
+    return SurfaceSwing{
+        .place = place, .height_mm = *middle, .from_points_mm = (near.front().head<2>() - place).norm()};
   }
 
  private:
