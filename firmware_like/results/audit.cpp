@@ -36,8 +36,7 @@ constexpr double edges_agree_mm = 0.4;
 constexpr double contradiction = 5;
 // The scatter of points about the surface, as a share of the scanner's noise, that is neither too much nor too little.
 constexpr double most_noise = 1.5, least_noise = 0.5;
-// The rms of so many shots or more is good to a sixth. In 192 runs on good plates it stayed below 1.45 times what the
-// arm promises.
+// In 192 runs on good plates the rms of so many shots stayed below 1.45 times what the arm promises.
 constexpr std::size_t few_shots = 10;
 constexpr double most_repeatability = 1.6;
 // A model explains the shots' disagreement when it takes away so much of its square.
