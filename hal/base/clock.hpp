@@ -24,12 +24,11 @@ class Clock {
   virtual Instant now() noexcept MOLDLOFT_NONBLOCKING = 0;
   virtual void sleep_until(Instant wake) noexcept = 0;  // returns at once when `wake` has passed
 
-  // An instant not far ahead at which something periodic should begin: now, where nothing else has its times.
+  // A near instant at which something periodic should begin: now, where nothing else is periodic.
   virtual Instant good_start() noexcept MOLDLOFT_NONBLOCKING { return now(); }
 
-  // Processor time of the calling thread, from any origin. Where it grows less than now() does, the
-  // thread waited or was ready and did not run. Costs more than now(). Where time is not real nobody
-  // is ever preempted.
+  // Processor time of the calling thread, from any origin. Where it grows less than now() does, the thread
+  // waited or was ready and did not run. Costs more than now(). In virtual time nothing is ever preempted.
   virtual Duration thread_time() noexcept MOLDLOFT_NONBLOCKING { return now(); }
 
   // Says that work of this declared cost has just been done. A real clock has seen it pass and ignores the
@@ -53,8 +52,8 @@ class SteadyClock final : public Clock {
   Duration start_;
 };
 
-// Time that moves only when somebody sleeps or charges a cost. The world that lives in this time (simulated devices)
-// is carried along by overriding advance().
+// Time that moves only when a thread sleeps or charges a cost. The world that lives in this time (simulated
+// devices) is carried along by overriding advance().
 class VirtualClock : public Clock {
  public:
   Instant now() noexcept MOLDLOFT_NONBLOCKING final { return now_; }

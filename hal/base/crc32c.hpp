@@ -1,6 +1,6 @@
 // CRC-32C (Castagnoli; iSCSI, RFC 3720): polynomial 0x1EDC6F41 reflected, start and end inverted. "123456789"
-// gives 0xE3069283. crc32c() picks the fastest variant that the processor has; all are here so that a
-// test can hold one against the other.
+// gives 0xE3069283. crc32c() picks the fastest variant that the processor has. All are declared here, so that
+// a test can compare them.
 //
 // Thread       any: no state
 // Allocation   none

@@ -1,4 +1,4 @@
-// A short text that lives inside its owner: what a message is made of where the heap is out of bounds.
+// A short text that lives inside its owner, for messages where the heap must not be used.
 //
 // Thread       a value, like an int
 // Blocking     never
@@ -18,7 +18,7 @@
 
 namespace moldloft::hal {
 
-// A pattern of fmt that fits the arguments' types, or the program does not compile: the check is over before it runs.
+// A pattern of fmt. It is checked against the arguments' types at compile time.
 template <typename... Args>
 struct BasicTextPattern {
   MOLDLOFT_EFFECTS_UNCHECKED_BEGIN
@@ -53,7 +53,8 @@ class FixedText {
   template <typename... Args>
   static FixedText format(TextPattern<Args...> text_pattern, Args&&... args) MOLDLOFT_NONBLOCKING {
     FixedText text;
-    // fmt writes where it is told to and throws for a pattern that does not fit, which cannot get here.
+    // fmt writes into this buffer. It would throw for a pattern that does not fit, but such a pattern
+    // does not compile.
     const auto result = checked_at_run_time([&] {
       return fmt::format_to_n(text.chars_.data(), capacity, text_pattern.pattern,
                               std::forward<Args>(args)...);

@@ -1,5 +1,5 @@
-// What a device's driver had to throw away, or to say once more, counted by a name that people read. The report of a
-// run holds the counts: garbled lines point to a cable, stale frames to a scanner that is too slow.
+// What a device's driver threw away or repeated, counted under a name for people. The report of a run holds
+// the counts. Garbled lines point to a cable, stale frames to a scanner that is too slow.
 //
 // Thread       any, when the control thread has come to rest
 // Allocation   yes

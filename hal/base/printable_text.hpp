@@ -8,7 +8,7 @@
 //     surrogates, overlong forms, no         each byte for itself: from 0xA1 on the letter that Latin-1 has there,
 //     characters, bytes that are no UTF-8    which is what devices send ("61 °C"), else ?
 //
-// What is fit already stays as it is, so it does no harm to do it twice.
+// Printable text stays as it is, so doing it twice does no harm.
 //
 // Thread       any: no state
 // Allocation   make_printable: none; the others as their result does
@@ -22,7 +22,7 @@
 
 namespace moldloft::hal {
 
-// Writes what fits of it into `out`, whole characters only; returns how many bytes that are.
+// Writes as many whole characters as fit into `out`; returns their number of bytes.
 std::size_t make_printable(std::string_view text, std::span<char> out) noexcept MOLDLOFT_NONBLOCKING;
 
 template <std::size_t capacity>

@@ -1,4 +1,4 @@
-// A byte link: two directions of bytes to one device, never waiting.
+// A byte link: bytes to and from one device, never waiting.
 //
 // Thread       the control thread only
 // Blocking     never; read and write move what they can now
@@ -29,8 +29,8 @@ class ByteLink {
   // Takes what fits into the send buffer; returns how many bytes were taken. The rest is the caller's to keep.
   virtual std::size_t write(std::span<const std::byte> in) noexcept MOLDLOFT_NONBLOCKING = 0;
 
-  // Looks at the link once more (a pending connect may have ended, a peer may have hung up) and says how it stands. Two
-  // looks may get two answers: who decides by one asks once.
+  // Looks at the link again (a pending connect may have ended, a peer may have hung up) and returns its
+  // state. Two looks may get two answers, so a caller that decides by the state asks once.
   virtual LinkState state() noexcept MOLDLOFT_NONBLOCKING = 0;
   virtual std::string_view why() const noexcept MOLDLOFT_NONBLOCKING = 0;
 };

@@ -1,4 +1,4 @@
-// A simulated cable: two byte links that are each other's far end, with a rate and a delay, in the time
+// A simulated cable: two byte links, each the far end of the other, with a rate and a delay in the time
 // of a clock.
 //
 // Thread       one thread

@@ -33,9 +33,10 @@ class Claim {
   int socket_ = -1;
 };
 
-// The scanner at an address; however it is written, it is the same one.
+// The scanner at an address; spellings of one address are one claim.
 std::expected<Claim, std::string> claim_address(const std::string& host, std::uint16_t port);
-// The port behind a device's name, whatever links lead there; nothing is claimed where there is no device yet.
+// The port behind a device's name, also by way of symbolic links. Nothing is claimed where there is
+// no device yet.
 std::expected<Claim, std::string> claim_serial(const std::string& device);
 std::expected<Claim, std::string> claim_folder(const std::string& path);
 

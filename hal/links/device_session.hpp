@@ -2,8 +2,9 @@
 //
 //     closed -> start() -> opening -> open -> lose() -> waiting -> opening -> ...
 //
-// The session never decides that a device is gone: receive() and transmit() bring news, is_silent() answers, and
-// the driver calls lose(). So whatever goes wrong, a bad byte or a cut cable, takes the driver's one way.
+// The session never decides that a device is gone: receive() and transmit() bring news, is_silent()
+// answers, and the driver calls lose(). So every fault, a bad byte or a cut cable, takes the same way
+// through the driver.
 //
 // What is written waits in an outbox of fixed size, and flush() moves what the link takes. A request that finds
 // no room is as good as lost on the way: the driver's own time-out takes care of it.
@@ -50,7 +51,8 @@ class DeviceSession {
   News receive() MOLDLOFT_NONBLOCKING;              // looks at the link, once
   News transmit(Instant now) MOLDLOFT_NONBLOCKING;  // opens it again when the pause is over
   void lose(Instant now) MOLDLOFT_NONBLOCKING;      // closes the link; the next attempt comes after the pause
-  // The device is the right one: the next pause is the first again. A link that opens does not show that yet.
+  // The device has proved to be the right one: the next pause is the first again. An open link alone does
+  // not prove it.
   void greeted() MOLDLOFT_NONBLOCKING { back_off_ = 0ns; }
 
   State state() const MOLDLOFT_NONBLOCKING { return state_; }

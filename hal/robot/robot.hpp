@@ -1,5 +1,5 @@
-// What the cell asks of a robot arm, whatever its make. A new make implements this and gets one line in the
-// factory of firmware_like/.
+// What the cell asks of a robot arm of any make. A new make implements this and gets one row in the
+// table of firmware_like/config/device_makes.
 //
 // Thread       the control thread; receive() early in a tick, transmit() late in it
 // Blocking     never

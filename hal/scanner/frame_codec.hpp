@@ -4,7 +4,8 @@
 // Thread       any; pure functions
 // Blocking     never
 // Allocation   the frame that is returned
-// Failure      one phrase: what is wrong with the bytes. Nothing that they say is believed beyond what they are
+// Failure      one phrase: what is wrong with the bytes. No size that they state is trusted beyond
+//              their own number
 #pragma once
 
 #include "hal/scanner/frame.hpp"

@@ -157,7 +157,7 @@ std::expected<StatusReply, Flaw> decode_status(std::span<const std::byte> payloa
     MOLDLOFT_NONBLOCKING;
 std::expected<ErrorReply, Flaw> decode_error(std::span<const std::byte> payload) noexcept
     MOLDLOFT_NONBLOCKING;
-// A FRAME of this many stripes and points takes at most so many bytes, header and CRC and all, intensity included.
+// The most bytes that a FRAME of so many stripes and points takes, with header, CRC and intensity.
 std::size_t largest_message(std::size_t stripes, std::size_t points, Encoding) noexcept;
 
 // FRAME messages as a run's store keeps them.
@@ -169,7 +169,7 @@ std::expected<FrameHead, Flaw> decode_frame_head(std::span<const std::byte> payl
 // Fills `frame` (its arrays must be large enough) from a FRAME payload; NaN where a point is missing.
 std::expected<void, Flaw> decode_frame(std::span<const std::byte> payload,
                                        Frame& frame) noexcept MOLDLOFT_NONBLOCKING;
-// The same in pieces: everything but the points, which is where all that can be wrong lies, ...
+// The same in pieces: everything but the points, and so everything that can be wrong, ...
 std::expected<FrameHead, Flaw> begin_frame(std::span<const std::byte> payload,
                                            Frame& frame) noexcept MOLDLOFT_NONBLOCKING;
 // ... then the coordinates of points `first` to `end` - 1 of the same payload, 2 ns a point, ...
@@ -178,8 +178,8 @@ void decode_points(std::span<const std::byte> payload, const FrameHead&, std::si
 // ... and the intensities of all points, 0 where none are sent.
 void decode_intensities(std::span<const std::byte> payload, const FrameHead&,
                         Frame& frame) noexcept MOLDLOFT_NONBLOCKING;
-// Of a payload that is still on its way: how many points, from the first, have all coordinates among its first
-// `have` bytes. Nothing before these points' bytes is missing then.
+// For a payload that is still on its way: how many points, from the first, have all coordinates among its
+// first `have` bytes. No byte before those of these points is missing then.
 std::size_t points_within(std::size_t have, const FrameHead&) noexcept MOLDLOFT_NONBLOCKING;
 
 }  // namespace moldloft::hal::psc1

@@ -4,8 +4,8 @@
 //
 // The way through it is the table in psc_table.cpp. A shot is repeated under its own id, so nothing is
 // exposed twice for one shot. One case the driver cannot mend: the sensor restarts (new session) between
-// EXPOSED and FRAME. The arm may have left by then, a second exposure would be of another place: such a shot
-// fails and the cell plans it again.
+// EXPOSED and FRAME. The arm may have left by then, and a second exposure would be of another place. Such a
+// shot fails, and the cell plans it again.
 //
 // Thread, blocking, allocation, failure: as Scanner says
 #pragma once

@@ -1,5 +1,5 @@
-// What the cell asks of a laser-stripe scanner, whatever its make. A new make implements this and gets one
-// line in the factory of firmware_like/.
+// What the cell asks of a laser-stripe scanner of any make. A new make implements this and gets one row in
+// the table of firmware_like/config/device_makes.
 //
 // Thread       the control thread; receive() early in a tick, transmit() late in it
 // Blocking     never
@@ -69,10 +69,10 @@ class Scanner {
   virtual std::optional<ScannerEvent> next_event() MOLDLOFT_NONBLOCKING = 0;
   virtual ScannerState state() const MOLDLOFT_NONBLOCKING = 0;
   virtual const ScannerInfo& info() const MOLDLOFT_NONBLOCKING = 0;
-  // The last accepted one, valid until the next trigger(); after `arriving` the one that is on its way, which
-  // `frame` makes good and shot_failed or lost take back. A frame's lines are there at once. Its points are
+  // The last accepted frame, valid until the next trigger(). After `arriving` it is the one on its way;
+  // `frame` confirms it, shot_failed and lost withdraw it. A frame's lines are there at once. Its points are
   // unpacked in pieces, so that a large frame does not fill a tick. A driver unpacks a whole frame by itself,
-  // slowly, where nobody asks.
+  // slowly, when nobody asks for it.
   virtual const Frame& frame() const MOLDLOFT_NONBLOCKING = 0;
   virtual void unpack(std::size_t at_most_points) MOLDLOFT_NONBLOCKING = 0;
   virtual std::size_t unpacked() const
