@@ -1,6 +1,6 @@
-// The one gate to the robot. Every motion to a target goes through send_checked(), which asks the motion guard first:
-// what the guard refuses is never sent, whichever way it comes. Nothing else in this room holds a robot that it could
-// move; who only wants to know how the arm is gets a const one.
+// The one gate to the robot. Every motion to a target goes through send_checked(), which asks the motion
+// guard first. A target that the guard refuses is never sent. Nothing else in this room holds a robot that it
+// could move; parts that only ask for its state get a const one.
 //
 // Thread       the control thread
 // Blocking     never

@@ -1,4 +1,4 @@
-// What a cell is told once, before it starts. Lengths in mm, angles in rad.
+// The settings of a cell, given once before it starts. Lengths in mm, angles in rad.
 #pragma once
 
 #include "geometry/rigid_motion.hpp"

@@ -1,5 +1,5 @@
-// Brings scanner and robot to where a run can begin: connected, the configured ones, the arm calibrated. The table is
-// start_sequence.hpp; this class finds out what has come about and carries the actions out.
+// Makes scanner and robot ready for a run: connected, the configured ones, the arm calibrated. The table is
+// start_sequence.hpp; this class finds the events and carries out the actions.
 //
 // Thread       the control thread
 // Blocking     never

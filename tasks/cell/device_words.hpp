@@ -1,4 +1,4 @@
-// What is said of a device that is missing or does not fit, in one line each.
+// The messages about a device that is missing or does not fit, one line each.
 //
 // Pure, no allocation.
 #pragma once
@@ -17,7 +17,7 @@ namespace moldloft::tasks {
 // Of the device that is missing: its driver says why, and may have named it already.
 hal::Message why_not_ready(std::string_view device, std::string_view why) MOLDLOFT_NONBLOCKING;
 
-// A scanner that is lost comes back by itself, or does not: the line says what is waited for and how to end it.
+// For a scanner that is lost: what the cell waits for, and how to end the wait.
 hal::Message waiting_for_scanner(std::string_view why, hal::Duration limit) MOLDLOFT_NONBLOCKING;
 
 // Nothing when the scanner is the configured one: memory plan, tracker's steps and zig-zag are made for its field of

@@ -1,5 +1,5 @@
-// Waits for the disk: a shot is not taken while the records of those before are still on their way to it. For moments
-// where it is slow; where it is full or hangs the cell holds, and says so.
+// Waits for the disk: no shot is taken while the records of those before are still on their way to it. A slow
+// disk costs moments. When the disk is full or hangs, the cell holds and says so.
 //
 // Thread       the control thread
 // Blocking     never

@@ -1,5 +1,6 @@
 // The last check before a target goes to the robot: finite, inside the workspace, not too long a step, not
-// too fast. What fails is never sent; the message names the limit. And the first check of where it says it has arrived.
+// too fast. A target that fails is never sent; the message names the limit. The first check of the pose at
+// arrival stands here too.
 //
 // Units mm and rad, world frame. Pure, no allocation.
 #pragma once

@@ -48,7 +48,8 @@ class ShotUser {
                            hal::Scanner* unpacks) MOLDLOFT_NONBLOCKING = 0;
   virtual void frame_is_whole(const ShotOrder&, const hal::Frame&, hal::Scanner* unpacks,
                               bool of_earlier_run) MOLDLOFT_NONBLOCKING = 0;
-  // The next shot may be ordered: the arm is free. Where only a frame can tell which, the order comes after the frame.
+  // The next shot may be ordered: the arm is free. If only a frame can tell which shot, the order comes
+  // after the frame.
   virtual void arm_is_free() MOLDLOFT_NONBLOCKING = 0;
   // A place of the surface whose shot was given up, to be visited once more at the end; false without room for it.
   virtual bool visit_again(const ShotPlace&) MOLDLOFT_NONBLOCKING = 0;

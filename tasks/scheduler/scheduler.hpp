@@ -1,19 +1,21 @@
 // The fixed-step cooperative scheduler: a static table of tasks, run in its order at every tick, and
 // background tasks in the slack that is left.
 //
-// Deadlines    absolute: next = previous + tick, in 64-bit nanoseconds; a tick that another ran into by more
-//              than the tolerance is missed, counted with its cause, and treated by the policy that the settings name
-// Statistics   one clock read per task boundary; the first ticks after start() are left out (caches and pages warm up).
-//              Costs are by the clock. The thread's own processor time is read once a tick, between two ticks, and
-//              once more where a tick was missed: it tells a long task from one that was preempted
-// Background   a step runs only if the larger of its declared quantum and its decaying measured peak fits between now
-//              and the guard time before the next tick; a step of a kind whose pieces cost alike (next_kind())
-//              already if its kind's measured peak does, and the quantum would end within the tolerance of a late
-//              tick. What does not fit has its peak halved towards the declared quantum; after `starvation_ticks`
-//              without a run a task gets one step (counted as forced) as soon as its quantum ends within the guard
-//              time or that tolerance, at most one forced step of all tasks a tick. So background work that keeps its
-//              quantum moves the start of a tick by no more than that, and never costs one; a table that keeps its
-//              budgets leaves room in every tick (task_table.hpp)
+// Deadlines    absolute: next = previous + tick, in 64-bit nanoseconds. A tick that another ran into by
+//              more than the tolerance is missed. It is counted with its cause and treated by the policy
+//              of the settings
+// Statistics   one clock read per task boundary; the first ticks after start() are left out (caches and pages
+//              warm up). Costs are by the clock. The thread's own processor time is read once between two
+//              ticks, and again where a tick was missed. It tells a long task from a preempted one
+// Background   a step runs only if it fits between now and the guard time before the next tick. Its time is
+//              taken as the larger of its declared quantum and its decaying measured peak. Where the pieces
+//              of a kind cost alike (next_kind()), the kind's measured peak decides, if the quantum would
+//              still end within the tolerance of a late tick. A step that does not fit has its peak halved
+//              towards the quantum. After `starvation_ticks` without a run a task gets one step, counted as
+//              forced, as soon as its quantum ends within the guard time or that tolerance. All tasks
+//              together get at most one forced step a tick. So background work that keeps its quantum delays
+//              a tick by no more than that, and never costs one. A table that keeps its budgets leaves room
+//              in every tick (task_table.hpp)
 // Thread       add*() before start(); run*() on the control thread; running_task() and heartbeat() from anywhere
 // Blocking     only in Clock::sleep_until, between ticks
 // Allocation   none: the tables are arrays of fixed size
@@ -83,7 +85,7 @@ class Scheduler {
     return missed_by_[static_cast<std::size_t>(cause)];
   }
   const MissedTick& last_miss() const noexcept { return last_miss_; }
-  // The first `misses_kept` times that ticks were missed. What was lost first tells more than what came of it.
+  // The first `misses_kept` times that ticks were missed. The first losses tell more than their consequences.
   std::span<const MissedTick> first_misses() const noexcept { return {first_misses_.data(), first_count_}; }
   Instant next_tick() const noexcept { return next_tick_; }
 

@@ -87,8 +87,8 @@ struct TableError {
   std::size_t row = 0;  // the first that is wrong; of beyond_the_tick: 0
 };
 
-// The largest sum of budgets that fall due together. Periods whose common multiple is beyond 10,000 ticks count as if
-// all their rows could meet, which is on the safe side.
+// The largest sum of budgets that fall due together. Periods with a common multiple beyond 10,000 ticks count
+// as if all their rows could meet, which is on the safe side.
 constexpr Duration busiest_tick(std::span<const TaskSpec> table) {
   constexpr std::uint64_t longest_cycle = 10'000;
   std::uint64_t cycle = 1;

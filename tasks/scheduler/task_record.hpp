@@ -32,7 +32,7 @@ struct BackgroundRecord {
   Instant longest_at{0};  // when the longest step began
 };
 
-// Whose fault a missed tick is: of the three parts that made it late, the largest.
+// The cause of a missed tick: the largest of the three parts that made it late.
 enum class MissCause : std::uint8_t {
   woken_late,  // the machine woke the control thread late
   preempted,   // the control thread was ready and did not have the processor

@@ -1,6 +1,6 @@
-// Who may still read a frame and what is being made of it. Each reader holds a lease; the next TRIGGER, which lets the
-// driver reuse the buffer, waits until no lease is left. A lease moves on with the work: from the look at the shot to
-// the reserve or to the fit.
+// Says whether anybody still reads a frame. Each reader holds a lease. The next TRIGGER lets the driver reuse
+// the buffer, so it waits until no lease is left. A lease moves on with the work: from the look at the shot
+// to the reserve or to the fit.
 //
 // Thread       the control thread only
 // Blocking     never

@@ -59,8 +59,8 @@ class SurfaceTask final : public BackgroundTask {
   explicit SurfaceTask(const SurfaceTaskSettings&);
 
   void begin() MOLDLOFT_NONBLOCKING;
-  // Looks at the frame that `shot` has begun; looking() turns false when its view is there. Goes before all else, but
-  // for the times when more of the frame has to arrive first.
+  // Looks at the frame that `shot` has begun; looking() turns false when its view is there. Goes before all
+  // other work, except while more of the frame has to arrive.
   void look(ShotView& shot) { looking_at_ = &shot; }
   void stop_looking() { looking_at_ = nullptr; }
   bool looking() const { return looking_at_ != nullptr; }
@@ -84,7 +84,7 @@ class SurfaceTask final : public BackgroundTask {
   std::size_t next_kind() const override { return can_look() ? looking_at_->next_kind() : 0; }
 
   Stage stage() const { return stage_; }
-  // The outline is there, the surface does not take a shot yet: what is exposed now might come too early.
+  // The outline is there, but the surface takes no shot yet. A shot exposed now might come too early.
   bool prepares() const { return stage_ == Stage::clearing || stage_ == Stage::folding_reserve; }
   bool outline_ready() const { return stage_ >= Stage::clearing && stage_ != Stage::failed; }
   geometry::Error error() const { return error_; }
