@@ -1,4 +1,4 @@
-// How our programs read their arguments: what is wrong with them is one line that says what to do.
+// How our programs read their arguments. A mistake in them gives one line that says what to do.
 //
 // Failure      that line on standard error, and the exit code 1
 #pragma once

@@ -1,5 +1,5 @@
-// The commands of the program, one row each: its name, what it is for, and the function that puts its options into a
-// command line. Help, manual pages and completion follow from it (a test holds them together).
+// The commands of the program, one row each: its name, what it is for, and the function that puts its options
+// into a command line. Help follows from it, and a test compares manual pages and completion with it.
 #pragma once
 
 #include <CLI/CLI.hpp>

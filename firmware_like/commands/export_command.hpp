@@ -1,5 +1,5 @@
 // `moldloft export`: the surface of a run, or a surface.json, as STEP and IGES files. The value returned is
-// the program's exit code; what went wrong is one line on stderr.
+// the program's exit code. A failure gives one line on stderr.
 #pragma once
 
 #include <string>

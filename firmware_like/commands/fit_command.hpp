@@ -1,4 +1,4 @@
-// `moldloft fit`: outline and surface once more from the shots of a stored run. The value returned is
+// `moldloft fit`: computes outline and surface again from the shots of a stored run. The value returned is
 // the program's exit code (complaint.hpp).
 #pragma once
 

@@ -1,6 +1,7 @@
-// `moldloft latency`: the timing self-test. The deployed scheduler ticks on the real clock with the process set up
-// as for a run, the surface fit in every slack and the recorder writing a real run store; beside it, in turns,
-// cyclictest. The value returned is the program's exit code: 0 when it was measured, whatever came out.
+// `moldloft latency`: the timing self-test. The deployed scheduler ticks on the real clock with the process
+// set up as for a run. The surface fit runs in every slack, and the recorder writes a real run store.
+// cyclictest takes turns with it if asked for. The value returned is the program's exit code: 0 when the
+// measurement succeeded, whatever its figures.
 #pragma once
 
 #include "firmware_like/results/timing_report.hpp"
@@ -32,7 +33,8 @@ struct TurnPlan {
 };
 TurnPlan plan_turns(double duration_s, hal::Duration tick, bool compare);
 
-// What makes cyclictest's turns like ours: priority, interval, processor and memory lock, as far as ours got them.
+// The options that make cyclictest's turns like ours: priority, interval, processor and memory lock, as
+// granted to ours.
 CyclictestSettings same_as(const RunConditions&, hal::Duration tick, std::int64_t ticks);
 
 // Both wake-up latencies, their ratios, and how they were made comparable.

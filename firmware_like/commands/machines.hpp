@@ -1,5 +1,6 @@
-// The state machines as diagrams, drawn from the tables themselves: `moldloft machines` prints them, and
-// tasks/README.md and hal/README.md hold exactly that (a test compares), so no picture falls behind the code.
+// The state machines as diagrams, drawn from the tables themselves: `moldloft machines` prints them.
+// tasks/README.md and hal/README.md hold exactly this output (a test compares), so no picture falls
+// behind the code.
 //
 // A guard is shown by its name; a row that always agrees, after others of the same state and event, is the `else`.
 //

@@ -23,7 +23,7 @@ std::string out_of_limits(std::string_view option, std::string_view word, const 
                      limits.unit.empty() ? "" : " ", limits.unit);
 }
 
-// Binds `value`, which keeps what it has where the option is not given.
+// Binds `value`, which is left alone when the option is not given.
 template <typename Number>
 CLI::Option* add_number(CLI::App& command, const std::string& name, Number& value,
                         const Limits<Number>& limits, const std::string& about) {
@@ -37,7 +37,7 @@ CLI::Option* add_number(CLI::App& command, const std::string& name, Number& valu
                               limits.max));
 }
 
-// The same, and --help shows the value that stands where the option is not given.
+// The same, and --help shows the default.
 template <typename Number>
 CLI::Option* add_number_with_default(CLI::App& command, const std::string& name, Number& value,
                                      const Limits<Number>& limits, const std::string& about) {

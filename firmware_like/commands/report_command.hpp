@@ -1,5 +1,5 @@
-// `moldloft report`: what a stored run's summary.json and timing.json say, on the terminal, and its report.html made
-// anew. The value returned is the program's exit code; what went wrong is one line on stderr.
+// `moldloft report`: prints a stored run's summary.json and timing.json as tables, and writes its report.html
+// anew. The value returned is the program's exit code. A failure gives one line on stderr.
 #pragma once
 
 #include <string>

@@ -84,7 +84,8 @@ struct CellConfig {
 CellConfig default_config();
 std::expected<CellConfig, ConfigError> load_config(const std::string& path);
 
-// All that is wrong with a text and all that looks wrong, by line. The configuration holds what could be read.
+// All errors of a text and all that looks like a slip, by line. The configuration holds the values that
+// could be read.
 struct ExaminedConfig {
   CellConfig config;
   std::vector<ConfigFinding> findings;
@@ -94,8 +95,8 @@ std::expected<std::string, ConfigError> read_config(const std::string& path);  /
 std::expected<CellConfig, ConfigError> parse_config(const std::string& text, const std::string& path);
 
 // The first key whose value differs between two configurations and would make a run measure differently
-// ("start.yaw_deg"); empty when there is none. Where the devices are found, when the program gets its
-// turn, how much memory is planned for, names and comments make no difference.
+// ("start.yaw_deg"); empty when there is none. Places of devices, real-time settings, the memory plan, names
+// and comments make no difference.
 std::string first_difference(const std::string& text, const std::string& other);
 
 }  // namespace moldloft::firmware_like

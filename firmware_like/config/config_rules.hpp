@@ -1,7 +1,8 @@
-// What no key of a configuration can say alone: values that contradict each other, and values that are possible but
-// look like a slip. One list, for `moldloft run`, which refuses the errors, and for `moldloft check`, which prints all.
+// Rules about several keys of a configuration: values that contradict each other, and values that are
+// possible but look like a slip. The list is one. `moldloft run` refuses its errors, `moldloft check`
+// prints all findings.
 //
-// A rule is an error only where a run with it cannot measure: what a run could do is at most a warning.
+// A finding is an error only when no run can measure with it. Otherwise it is at most a warning.
 //
 // Units        mm, degrees, percent, as the keys say; poses in world
 // Thread       any; pure

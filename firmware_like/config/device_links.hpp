@@ -1,5 +1,5 @@
-// The byte links that a device can be reached by, by the name that `link` in its section gives: one table. Any driver
-// runs on any of them.
+// The byte links to a device, by the name that `link` in its section gives: one table. Any driver runs
+// on any link.
 //
 // Thread       the first thread, before anything runs
 // Blocking     claim() never; open links as ByteLink says
@@ -28,7 +28,7 @@ struct LinkConfig {
 
 std::vector<std::string> link_names();
 std::unique_ptr<hal::ByteLink> make_link(const LinkConfig&);
-// Nobody else commands the device while the claim lives, connected or not.
+// While the claim lives, connected or not, no other process commands the device.
 std::expected<hal::Claim, std::string> claim_link(const LinkConfig&);
 
 std::string place_of(const LinkConfig&);      // "192.168.10.2:4014", "/dev/ttyS0"

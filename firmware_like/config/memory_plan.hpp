@@ -1,4 +1,4 @@
-// The memory plan: what the largest plate, the scanner's frames and the net ask for, subsystem by subsystem.
+// The memory plan: what the largest plate, the scanner's frames and the net need, subsystem by subsystem.
 // Printed and stored at start; after start the control thread takes no more.
 #pragma once
 

@@ -1,8 +1,8 @@
-// What people call things: the plate's name and the operator's remark, as they go into every file of a run.
+// The plate's name and the operator's remark, as they go into every file of a run.
 //
-// A name is one line of UTF-8. Quotes and slashes are letters like others: a name is never used as a path. Control
-// characters, other encodings, blank and overlong texts are refused, because CAD files, pages and the journal would
-// show something else than what was typed.
+// A name is one line of UTF-8. Quotes and slashes are letters like others: a name is never used as a path.
+// Control characters, other encodings, blank and overlong texts are refused, because CAD files, pages and the
+// journal would show something other than what was typed.
 //
 // Failure      what is wrong with the text and what is allowed, without the text itself
 #pragma once
@@ -24,7 +24,7 @@ std::expected<std::string, std::string> one_line(std::string_view text, std::str
 // Where a text stops being UTF-8; npos when it never does.
 std::size_t first_byte_not_utf8(std::string_view text);
 
-// What a plate is called that nobody has named: its folder's name, with '?' for what a name cannot hold.
+// The default name of a plate: its folder's name, with '?' for characters that a name cannot have.
 std::string name_of_folder(const std::filesystem::path&);
 
 }  // namespace moldloft::firmware_like

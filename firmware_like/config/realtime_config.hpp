@@ -1,5 +1,5 @@
-// [realtime] of the cell's configuration: what the control thread asks of the operating system. It makes no
-// difference to what is measured, only to when.
+// [realtime] of the cell's configuration: what the control thread asks of the operating system. It changes
+// when things are measured, never what.
 #pragma once
 
 namespace moldloft::firmware_like {

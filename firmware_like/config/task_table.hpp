@@ -1,5 +1,5 @@
-// The controller's task table: its rows are known when the program is written, so they are proven then. Budgets are
-// for the slowest processor that we admit; what a run really took stands beside them in its timing report.
+// The controller's task table. Its rows are known at compile time, so they are proven then. Budgets are for
+// the slowest processor that we admit; a run's timing report shows the real times beside them.
 #pragma once
 
 #include "tasks/scheduler/scheduler.hpp"

@@ -1,5 +1,6 @@
-// `moldloft check --connect`: whether both devices answer, and what they say of themselves. The scanner is greeted,
-// configured and asked for one exposure; the robot is asked SYN, STA and POS. Nothing that moves the arm is ever sent.
+// `moldloft check --connect`: do both devices answer, and what do they say of themselves? The scanner is
+// greeted, configured and asked for one exposure; the robot is asked SYN, STA and POS. Nothing that moves the
+// arm is ever sent.
 //
 // Thread       the caller's
 // Blocking     until both have answered or the configuration's device_timeout_s is over, whichever is first

@@ -18,8 +18,8 @@ inline constexpr const char* cells_folder = "/run/moldloft";
 // process has left it, or it is no socket; EACCES: we may not write to it).
 int try_socket(const std::string& path);
 
-// The socket of the only cell that runs: `folder`/control or one of `folder`/*/control. What dead processes have left
-// does not count. One that we may not write to does: it may be the cell that was meant.
+// The socket of the only running cell: `folder`/control or one of `folder`/*/control. Sockets left by dead
+// processes do not count. One that we may not write to does, since it may be the cell that was meant.
 std::expected<std::string, std::string> running_cell(const std::filesystem::path& folder = cells_folder);
 
 }  // namespace moldloft::firmware_like

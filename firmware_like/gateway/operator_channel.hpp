@@ -27,20 +27,20 @@ namespace moldloft::firmware_like {
 // All words that a cell knows, for people: "start, hold, ..., status".
 std::string operator_words();
 
-// What a word is answered with. `let_time_pass` is called, some ten times at most, while the control loop takes
-// the command up.
+// The answer to a word. `let_time_pass` is called, about ten times at most, while the control loop takes
+// up the command.
 std::string answer_to(std::string_view word, tasks::CellPort&, const std::function<void()>& let_time_pass);
 std::string status_json(const tasks::CellProgress&);
 
 class OperatorSocket {
  public:
-  // Takes the place of one that a dead process has left, never that of a living one.
+  // Replaces a socket that a dead process has left, never that of a living one.
   static std::expected<OperatorSocket, std::string> open(const std::string& path);
   OperatorSocket(OperatorSocket&& other) noexcept;
   OperatorSocket& operator=(OperatorSocket&&) = delete;
   ~OperatorSocket();
 
-  // Waits for a word for so long at most, and sends back what `answer` makes of it.
+  // Waits for a word, at most so long, and sends back the result of `answer`.
   void serve(hal::Duration wait, const std::function<std::string(std::string_view)>& answer) const;
 
  private:

@@ -10,7 +10,7 @@
 
 namespace moldloft::firmware_like {
 
-// What the cell itself does not know of what it waits for.
+// What the cell itself does not know about the things that it waits for.
 struct Surroundings {
   std::string scanner = "its address", robot = "its port";  // "192.168.10.2:4014", "/dev/ttyS0"
   bool has_operator = false;  // who can send a word: without one none is waited for
@@ -25,7 +25,7 @@ std::string progress_line(const tasks::CellProgress&, const Surroundings& = {});
 // last the line is cut, never inside a character.
 std::string progress_line_within(std::size_t columns, const tasks::CellProgress&, const Surroundings& = {});
 
-// Without the time that passes, and with what a person has to see to: it changes when something happens.
+// Without the passing time, and with what a person has to do. It changes only when something happens.
 std::string status_line(const tasks::CellProgress&, const Surroundings& = {});
 
 std::string notice_line(const tasks::Notice&);

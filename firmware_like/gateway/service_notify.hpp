@@ -1,10 +1,10 @@
-// What the service manager is told (sd_notify): ready, a line of status, stopping, and that the program lives. Where no
-// service manager listens, nothing is sent.
+// Messages to the service manager (sd_notify): ready, a line of status, stopping, and that the program lives.
+// Nothing is sent when no service manager listens.
 //
 // Thread       ordinary threads only, one at a time: it writes to a socket, which the control thread never waits for
 // Blocking     no: the manager's socket takes a datagram or the message is lost
 // Allocation   yes
-// Failure      none: a program that its manager does not hear is the manager's to restart
+// Failure      none: a manager that hears nothing restarts the program
 #pragma once
 
 #include "hal/base/clock.hpp"
@@ -17,7 +17,8 @@ class ServiceNotify {
  public:
   ServiceNotify();  // reads what the manager has put into the environment
 
-  // Within this time from one feed() to the next the manager believes that the program lives; 0: it does not ask.
+  // The longest time between two feed()s after which the manager still takes the program for alive; 0: it
+  // does not ask.
   hal::Duration watchdog() const { return watchdog_; }
 
   void ready(std::string_view status);

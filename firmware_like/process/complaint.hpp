@@ -1,4 +1,4 @@
-// How a command ends, and how a refusal is said: one line on standard error, and a code that is not zero.
+// How a command ends. A refusal is one line on standard error, and a code that is not zero.
 //
 // Thread       as say() (console.hpp)
 #pragma once
@@ -18,9 +18,9 @@ enum ExitCode : int {
   exit_warned = 5,   // measured, with warnings: the audit's findings
 };
 
-// The one line that a failure is; the exit code that goes with it.
+// Prints a failure as one line; returns its exit code.
 int complain(std::string_view what, std::string_view program = "moldloft", Priority = Priority::error);
-// The same for what has several lines, such as all errors of a configuration; each is made printable.
+// The same for several lines, such as all errors of a configuration; each is made printable.
 int complain_all(std::string_view lines, std::string_view program = "moldloft");
 
 }  // namespace moldloft::firmware_like

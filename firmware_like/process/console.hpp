@@ -21,16 +21,16 @@ namespace moldloft::firmware_like {
 // its limit are errors of a write from now on, no longer signals that kill.
 void open_console();
 
-// Text for a person on standard error, as it stands. When it cannot be written within a second it is dropped and
-// counted, and until somebody reads again nothing waits any more.
+// Writes text for a person on standard error, unchanged. Text that cannot be written within a second is
+// dropped and counted. From then on nothing waits until somebody reads again.
 void say(std::string_view text) noexcept;
 std::uint64_t unsaid() noexcept;  // texts that were not, or not wholly, written
 
-// A command's answer on standard output. Nothing is lost silently: end_of_output() tells.
+// Writes a command's answer on standard output. Nothing is lost silently: end_of_output() reports it.
 void show(std::string_view text) noexcept;
 void flush_shown() noexcept;  // for who watches while it is written
-// The same with a limit, for a program that has to come to its end whoever reads. True when it was written; if not, it
-// is the caller's to tell, and no failure of the command.
+// The same with a limit, for a program that has to end whether its output is read or not. Returns whether the
+// text was written. If not, the caller reports it, and the command has not failed.
 bool show_within(hal::Duration limit, std::string_view text) noexcept;
 
 // The exit code of a command that has shown its answer: 1, and a line that says why, when it could not be written.

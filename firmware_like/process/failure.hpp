@@ -1,4 +1,4 @@
-// Why something could not be done, for a person: one line that says what, where, and what to do.
+// A failure, told to a person: one line that says what, where, and what to do.
 #pragma once
 
 #include <string>

@@ -16,7 +16,7 @@ bool is_journal(int file, const char* journal_stream);
 bool stderr_is_journal();  // as the process was started
 
 std::string for_journal(Priority, std::string_view lines);  // each line with its mark
-// The same where standard error is the journal, the lines as they are where it is not.
+// The same where standard error is the journal; elsewhere the lines unchanged.
 std::string marked(Priority, std::string_view lines);
 
 }  // namespace moldloft::firmware_like

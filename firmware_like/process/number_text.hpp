@@ -1,4 +1,5 @@
-// A number that a person has typed, whole and within limits: "-1" for a count, "nan", "inf", "5mm" and "" are none.
+// A number that a person has typed, whole and within limits. "-1" for a count, "nan", "inf", "5mm" and
+// "" are refused.
 //
 // Thread       any; pure
 // Allocation   none
