@@ -18,7 +18,7 @@
 namespace moldloft::firmware_like {
 namespace {
 
-// An event that takes more states than this to one and the same state is a note beside it: as so many arrows it would
+// An event that leads from more states than this to one state becomes a note beside it. So many arrows would
 // hide everything else.
 constexpr std::size_t most_arrows_of_an_event = 5;
 

@@ -249,8 +249,8 @@ std::optional<ConfigFinding> wrong_encoding(const std::string& text) {
                        {}};
 }
 
-// What can be read of a text, and what makes it no TOML: lines that stand for themselves are passed over, so that the
-// errors after them are found as well; after any other the rest would be read for something else.
+// What can be read of a text, and what makes it no TOML. A wrong line that ends by itself is passed over, so
+// that the errors after it are found as well. After any other the rest would be misread.
 std::optional<toml::table> parsed_table(std::string text, std::vector<ConfigFinding>& findings) {
   constexpr int most_errors = 50;
   for (int errors = 0; errors < most_errors; ++errors) {

@@ -90,9 +90,9 @@ void Controller::transmit_robot(hal::Instant now) {
   if (cell_.waits_for_sending()) cell_.commands_sent(clock_.now());
 }
 
-// A cell that waits for a person has come to rest as far as one run of the program goes, unless a person can reach it:
-// what to do is in why(). What was measured leads to the same end each time, whoever is there, and a memory plan is
-// made at the start.
+// A cell that waits for a person ends this run of the program, unless a person can command it. why() says
+// what to do. What was measured leads to the same end each time, whoever is there, and a memory plan is made
+// at the start.
 bool Controller::at_rest() const {
   const bool repeats = cell_.cause() >= tasks::HoldCause::plan;
   switch (cell_.state()) {

@@ -30,8 +30,9 @@ constexpr std::size_t small_piece = 256;
 
 std::array<bool, 3> was_closed{};
 
-// A descriptor written to without waiting. Its open file is shared with the shell and with others, so it is not made
-// non-blocking itself: a terminal or a pipe is opened a second time, a socket is asked for each time.
+// A descriptor written to without waiting. Its open file is shared with the shell and with others, so it is
+// not made non-blocking itself. A terminal or a pipe is opened a second time; a socket is asked not to block
+// at each write.
 class Outlet {
  public:
   explicit Outlet(int descriptor) : file_{descriptor} {

@@ -82,8 +82,8 @@ SetupRow keep_freed_memory() {
   return row;
 }
 
-// With a finite limit the pages of the future must not be locked: the call succeeds while there is room, and later some
-// harmless allocation or thread fails for want of it.
+// With a finite limit the pages of the future must not be locked. The call succeeds while there is room, and
+// later some harmless allocation or thread fails.
 SetupRow lock_memory(bool wanted, bool& locked) {
   SetupRow row{.item = SetupItem::memory_lock,
                .wanted = wanted ? "all pages, now and later" : "no",

@@ -112,8 +112,9 @@ Layout lay_out(std::size_t panels, double head, View& view) {
           .plot_height = size.y() * view.scale};
 }
 
-// A text in lines that fit into the picture, cut between words, and where a part of the sentence ends if one does in a
-// line's last third, so that a number does not lose its unit. A word that is longer than a line is cut in itself.
+// A text in lines that fit into the picture, cut between words. If a part of the sentence ends in a line's
+// last third, the cut is there, so that a number does not lose its unit. A word that is longer than a line is
+// cut in itself.
 std::vector<std::string> lines_of(std::string_view text, double height_px) {
   const auto columns = static_cast<std::size_t>((width_px - 2 * margin_px) / (letter_width * height_px));
   const auto continues = [&](std::size_t at) {

@@ -106,9 +106,8 @@ class Wire {
 
 }  // namespace
 
-// What both ends share. Every successful open() of the host starts a new connection with empty wires;
-// the device learns of it by seeing `lost` once, as a server sees its old connection end before it
-// accepts the next.
+// What both ends share. Every successful open() of the host starts a new connection with empty wires. The
+// device then sees `lost` once, as a server sees its old connection end before it accepts the next.
 struct Cable::Ends {
   class End final : public ByteLink {
    public:

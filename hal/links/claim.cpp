@@ -82,8 +82,8 @@ bool is_pseudo_terminal(dev_t device) noexcept {
 std::expected<Claim, std::string> claim_serial(const std::string& device) {
   struct stat port {};
   if (::stat(device.c_str(), &port) != 0 || !S_ISCHR(port.st_mode)) return Claim{};
-  // A pseudo-terminal's number is given away again as soon as it is gone, while a process that had it may
-  // still live: there the moment of its making tells them apart. It is not asked of a real port, whose
+  // A pseudo-terminal's number is given away again as soon as it is gone, while a process that had it
+  // may still live. The time of its making tells the two apart. It is not asked of a real port, whose
   // owner may change.
   std::string name = fmt::format("serial/{}:{}", major(port.st_rdev), minor(port.st_rdev));
   if (is_pseudo_terminal(port.st_rdev))

@@ -134,8 +134,8 @@ std::size_t Recorder::high_water_bytes() const noexcept {
 // ---- the other side
 
 bool Recorder::drain(RunStore& to) {
-  // The events' end is fixed before the bulk's: bytes are written before the shot that points at them, so
-  // every shot in this transaction finds its bytes in it or in an earlier one.
+  // The events' end is fixed before the bulk's. Bytes are written before the shot that points at them, so
+  // every shot of this transaction finds its bytes in it or in an earlier one.
   RecordRing::Reader events{rings_->events};
   RecordRing::Reader bulk{rings_->bulk};
   if (rings_->bulk.used() == 0 && rings_->events.used() == 0) return true;

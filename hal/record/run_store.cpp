@@ -85,9 +85,9 @@ std::string uri_of(const std::string& path) {
   return uri;
 }
 
-// How a store is read in a folder that cannot be written (a read-only disk, another user's folder), where SQLite cannot
-// make the files that it shares with a writer. What a crashed or running program has committed last stands in the
-// write-ahead log beside it, and belongs to the run.
+// Reads a store in a folder that cannot be written (a read-only disk, another user's folder). SQLite cannot
+// make the files there that it shares with a writer. What a crashed or running program has committed last
+// stands in the write-ahead log beside it, and belongs to the run.
 struct ReadingWay {
   const char* options = "";
   bool index_in_memory = false;

@@ -137,8 +137,8 @@ std::expected<FlatSheet, SimError> make_explicit(const std::string& name, Triang
                     100 * down / (up + down)));
   }
   FlatSheet sheet;
-  // Before a border is walked, only what lies in the way of it goes: a face without any area in plan may hold the faces
-  // on both of its sides together.
+  // Before a border is walked, only the faces in its way are removed, since a face without any area in plan
+  // may hold the faces on both of its sides together.
   sheet.folds = static_cast<int>(
       std::erase_if(mesh.triangles, [&](const auto& t) { return plan_area(mesh, t) < -1e-9 * (up + down); }));
   sheet.folds += peel_steep_border(mesh);

@@ -104,8 +104,8 @@ class TextReader {
 
 }  // namespace
 
-// A count that fits the file's length to the byte tells a binary file, whatever its title; so does a title of "solid"
-// with bytes in it that no text has.
+// A file is binary if its count fits its length to the byte, whatever its title. It is binary too if its
+// title is "solid" but holds bytes that no text has.
 bool is_binary_stl(std::string_view bytes) {
   if (bytes.size() < head_bytes) return false;
   if (bytes.size() == head_bytes + facet_bytes * facets_announced(bytes)) return true;

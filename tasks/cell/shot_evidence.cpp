@@ -12,8 +12,8 @@ namespace {
 constexpr std::uint16_t stripe_stride = 3;  // of the runs that are kept
 constexpr std::uint32_t sample_stride = 24;
 
-// A run that ends so near to the limit of the depth range, as a share of it, ends there because of it: the slope of a
-// plate takes a stripe's next point beyond.
+// A run that ends so near to the limit of the depth range, as a share of it, ends because of the limit. The
+// slope of a plate takes the stripe's next point beyond it.
 constexpr double depth_share = 0.97;
 
 template <typename T>

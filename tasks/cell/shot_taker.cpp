@@ -200,8 +200,8 @@ void ShotTaker::on_arriving(std::uint32_t shot_id) {
   if (awaits_frame() && shot_id == exposed_.shot_id) user_.frame_comes(exposed_, scanner_.frame(), &scanner_);
 }
 
-// Where the arm still stands the shot is taken again; where it has gone on, the place is visited once more at the end
-// (surface) or at once (boundary: nothing else is known to do).
+// If the arm still stands there, the shot is taken again. If it has gone on, a surface shot's place is
+// visited once more at the end, a boundary shot's at once, since the tracker has no other place to go.
 void ShotTaker::on_failure(const hal::Message& text) {
   const bool arm_has_gone = state_ != ShotState::exposing;
   const ShotOrder again = arm_has_gone ? exposed_ : arm_;
@@ -255,8 +255,9 @@ bool ShotTaker::is_of_earlier_run(const ShotOrder& order) const {
   return archive_ != nullptr && order.number <= archive_->last();
 }
 
-// A surface shot that the archive leaves out before later ones was given up when the run was recorded, and its place
-// was put at the end of the plan (on_failure): so it is again, or every later number would stand for another place.
+// A surface shot that is missing from the archive before later ones was given up when the run was recorded,
+// and its place was put at the end of the plan (on_failure). The same happens here, or every later number
+// would stand for another place.
 void ShotTaker::skip_given_up() {
   while (archive_ != nullptr && ordered_ && ordered_->purpose == ShotPurpose::surface &&
          ordered_->number < archive_->last() && archive_->find(ordered_->number) == nullptr &&

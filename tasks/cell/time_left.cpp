@@ -13,8 +13,9 @@ constexpr double part_that_convinces = 0.6;
 // Half a square's side and half its diagonal: the start sees the edge somewhere between, with the plate at any angle.
 constexpr double side_by_distance = 2 * 0.8;
 
-// One edge says little: it may be a long plate's near side. So the guess leans on a plate that is usual for its
-// scanner, as many fields long, with this weight; all of it in the logarithm, because half and twice are equally wrong.
+// One edge says little: it may be a long plate's near side. So the guess leans, with this weight, on a plate
+// of usual size for its scanner, so many fields long. All of it is done in the logarithm, because half and
+// twice are equally wrong.
 constexpr double usual_fields = 2.85, usual_weighs = 0.6;
 
 // How far the tracker comes with a shot, in fields: less than it could, because of corners. After so many shots of its

@@ -166,8 +166,8 @@ bool Scheduler::step_background(std::size_t i, Instant& t, Instant limit, bool& 
   const std::size_t kind = background_[i]->next_kind();
   assert(kind < step_kinds);
   if (!step_fits(i, kind, t, limit)) {
-    // A forced step may use up the guard time and make the next tick late, never missed; and it does not come on top of
-    // a table that is late itself.
+    // A forced step may use up the guard time and make the next tick late, never missed. It is not added to a
+    // table that is late itself.
     const bool starving = ticks_ - last_run_tick_[i] >= settings_.starvation_ticks;
     const Instant due = limit + settings_.guard;
     if (!starving || !may_force || t > due || t + record.spec.quantum > due + settings_.late_tolerance) {
