@@ -14,11 +14,13 @@ using hal::Pose;
 using hal::RobotEvent;
 using hal::RobotState;
 using Kind = RobotEvent::Kind;
+using News = hal::DeviceSession::News;
 
 namespace {
 
 constexpr int stopped_code = 1;
-constexpr double farthest_mm = 10'000;  // a coordinate beyond it is no place of any arm
+constexpr double farthest_mm = 10'000;     // a coordinate beyond it is no place of any arm
+constexpr std::size_t outbox_bytes = 480;  // four of the longest lines: a command, a question, two stops
 
 // Six numbers and nothing behind them.
 std::optional<Pose> pose_from(std::string_view text) {
@@ -39,15 +41,24 @@ std::optional<Pose> pose_from(std::string_view text) {
               values[5] * hal::degree};
 }
 
+std::optional<int> code_from(std::string_view text) {
+  int code = 0;
+  if (text.empty() || text.front() != ' ') return std::nullopt;
+  const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), code);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return code;
+}
+
 }  // namespace
 
-// ---- what the cell asks
+OwnRobot::OwnRobot(hal::ByteLink& link, const Settings& settings)
+    : session_{link,
+               {.heartbeat = settings.question,
+                .silent_limit = settings.silence,
+                .outbox_bytes = outbox_bytes}},
+      settings_{settings} {}
 
-void OwnRobot::start(Instant now) {
-  if (started_) return;
-  started_ = true;
-  open(now);
-}
+// ---- what the cell asks
 
 bool OwnRobot::move(const Pose& target, int speed_percent, Instant now) {
   const double most = std::max({std::abs(target.x_mm), std::abs(target.y_mm), std::abs(target.z_mm)});
@@ -79,13 +90,19 @@ void OwnRobot::reset(Instant) {
 // ---- bytes in, bytes out
 
 void OwnRobot::receive(Instant now) {
-  if (state_ == RobotState::offline) return;
+  const auto news = session_.receive();
+  if (news == News::lost) return lose(session_.why(), now);
+  if (news == News::opened) {
+    state_ = latched_ ? RobotState::faulted : RobotState::synchronising;
+    session_.heard(now), session_.said(now);
+    say("?");
+  }
   std::array<std::byte, 256> bytes{};  // a line of 115200 baud brings 12 in a tick
-  const std::size_t count = link_.read(bytes);
+  const std::size_t count = session_.read(bytes);
   for (std::size_t i = 0; i < count; ++i) {
     const char c = static_cast<char>(bytes[i]);
     if (c == '\n') {
-      take({in_.data(), in_size_}, now);
+      if (!take({in_.data(), in_size_}, now)) ++unexpected_lines_;
       in_size_ = 0;
     } else if (c != '\r') {
       in_[std::min(in_size_, in_.size() - 1)] = c;  // a line that is too long is none of ours
@@ -95,44 +112,29 @@ void OwnRobot::receive(Instant now) {
 }
 
 void OwnRobot::transmit(Instant now) {
-  if (!started_) return;
-  const hal::LinkState link = link_.state();
-  if (link == hal::LinkState::lost || link == hal::LinkState::closed) {
-    if (opening_ || state_ != RobotState::offline) return lose(link_.why(), now);
-    if (now >= open_at_) open(now);
-    return;
-  }
-  if (link != hal::LinkState::open) return;
-  if (opening_) {
-    opening_ = false;
-    state_ = latched_ ? RobotState::faulted : RobotState::synchronising;
-    out_size_ = in_size_ = 0;
-    heard_ = now, asked_ = now - settings_.question;
-  }
-  if (now - heard_ >= settings_.silence) return lose("the arm does not answer", now);
+  if (session_.transmit(now) == News::no_connection) return lose("the arm's port does not open", now);
+  if (!session_.is_open()) return;
+  if (session_.is_silent(now)) return lose("the arm does not answer", now);
   if (has_command() && now >= command_until_)
     fail("the arm does not say how its command ended: look, then clear");
-  if (now - asked_ >= settings_.question) asked_ = now, say("?");
-  const std::size_t taken = link_.write(std::as_bytes(std::span{out_.data(), out_size_}));
-  std::copy(out_.begin() + static_cast<std::ptrdiff_t>(taken),
-            out_.begin() + static_cast<std::ptrdiff_t>(out_size_), out_.begin());
-  out_size_ -= taken;
+  if (session_.heartbeat_due(now)) session_.said(now), say("?");
+  session_.flush();
 }
 
-void OwnRobot::say(std::string_view line) {
-  if (state_ == RobotState::offline || out_size_ + line.size() + 1 > out_.size()) return;
-  std::copy(line.begin(), line.end(), out_.begin() + static_cast<std::ptrdiff_t>(out_size_));
-  out_size_ += line.size();
-  out_[out_size_++] = '\n';
+// A line that finds no room is as good as lost on the way; the time-out that follows takes care of it.
+void OwnRobot::say(std::string_view words) {
+  if (!session_.is_open()) return;
+  const Line line = Line::format("{}\n", words);
+  session_.write(std::as_bytes(std::span{line.view()}));
 }
 
-void OwnRobot::take(std::string_view line, Instant now) {
+bool OwnRobot::take(std::string_view line, Instant now) {
   const char kind = line.empty() ? '\0' : line.front();
   const std::string_view rest = line.empty() ? line : line.substr(1);
   const auto pose = kind == 'P' || kind == 'D' ? pose_from(rest) : std::nullopt;
   if (kind == 'P' && pose) {
-    heard_ = now;
-    if (state_ != RobotState::synchronising) return;
+    session_.heard(now), session_.greeted();
+    if (state_ != RobotState::synchronising) return true;
     state_ = RobotState::ready;
     events_.push({.kind = Kind::ready, .pose = *pose, .calibrated = true});
   } else if (kind == 'A' && rest.empty() && state_ == RobotState::commanded) {
@@ -142,33 +144,27 @@ void OwnRobot::take(std::string_view line, Instant now) {
   } else if (kind == 'D' && pose && state_ == RobotState::moving) {
     state_ = RobotState::ready;
     events_.push({.kind = Kind::done, .pose = *pose, .calibrated = true});
-  } else if (kind == 'E' && has_command()) {
-    int code = 0;
-    if (rest.empty() || std::from_chars(rest.data() + 1, rest.data() + rest.size(), code).ec != std::errc{})
-      return;
+  } else if (const auto code = kind == 'E' && has_command() ? code_from(rest) : std::nullopt) {
     state_ = RobotState::ready;
     events_.push({.kind = Kind::refused,
-                  .code = code,
-                  .text = code == stopped_code
+                  .code = *code,
+                  .text = *code == stopped_code
                               ? hal::Message{"the motion was stopped before it arrived"}
-                              : hal::Message::format("the arm refuses: its error {}", code)});
+                              : hal::Message::format("the arm refuses: its error {}", *code)});
+  } else {
+    return false;
   }
+  return true;
 }
 
 // ---- the link and the faults
 
-void OwnRobot::open(Instant now) {
-  opening_ = true;
-  open_at_ = now + settings_.back_off;
-  link_.open();
-}
-
 void OwnRobot::lose(std::string_view why, Instant now) {
   why_ = hal::Message::format("robot: {}", why);
+  session_.lose(now);
   if (state_ != RobotState::offline) events_.push({.kind = Kind::lost, .text = why_});
-  state_ = RobotState::offline, opening_ = false;
-  open_at_ = now + settings_.back_off;
-  link_.close();
+  state_ = RobotState::offline;
+  in_size_ = 0;
 }
 
 void OwnRobot::fail(std::string_view why) {

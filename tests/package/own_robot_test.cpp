@@ -1,6 +1,7 @@
 #include "package/own_robot.hpp"
 
 #include "hal/driver_bench.hpp"
+#include "hal/loss_of.hpp"
 
 #include <doctest/doctest.h>
 
@@ -137,6 +138,7 @@ TEST_CASE("own driver: an arm that says nothing is lost, and noise is no answer"
   cell.run(1s);
   CHECK(cell.events.size() == 1);
   CHECK(cell.driver.state() == RobotState::ready);
+  CHECK(moldloft::hal::loss_of(cell.driver, "unexpected lines") == 7);
   cell.peer.mute = true;
   REQUIRE(cell.run_until(Kind::lost));
   CHECK(cell.driver.why() == "robot: the arm does not answer");
