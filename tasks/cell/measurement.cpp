@@ -147,6 +147,7 @@ void Measurement::seek() {
   plan_begun_ = false;
   heights_.reset();
   evidence_.begin();
+  health_ = {};
   spent_ = hal::Duration{0};
   time_left_.begin(settings_.start.centre.head<2>());
   surface_.begin();
@@ -176,8 +177,8 @@ void Measurement::scan() {
 }
 
 void Measurement::hold_for_flaw(HoldCause cause) {
-  supervisor_.hold(cause,
-                   hal::Message::format("{}: {}", to_string(phase_), geometry::to_string(surface_.error())));
+  hold_for_plate(cause,
+                 hal::Message::format("{}: {}", to_string(phase_), geometry::to_string(surface_.error())));
 }
 
 // The background work finds the plate in the frame, and may begin before all of it is there. use_view() follows when
@@ -224,7 +225,25 @@ void Measurement::use_view() {
   if (look_.is_held() && accepted_ && !surface_.looking()) use_shot(std::move(look_));
 }
 
+// No two exposures have the same noise: the same heights again are the same frame again.
+bool Measurement::is_of_a_sound_scanner() {
+  const FrameHealth before = std::exchange(health_, health_of(view_.frame()));
+  if (health_.noise_mm == 0 || health_.fingerprint != before.fingerprint) return true;
+  supervisor_.hold(HoldCause::measurement,
+                   hal::Message::format("the scanner sends the same frame again (shot {}): restart it, then "
+                                        "begin a new run",
+                                        looked_at_.number));
+  return false;
+}
+
+// A plate that cannot be tracked is no news where the scanner itself is at fault.
+void Measurement::hold_for_plate(HoldCause cause, const hal::Message& what) {
+  const auto fault = scanner_fault(health_, settings_.view.runs.noise_mm);
+  supervisor_.hold(fault ? HoldCause::measurement : cause, fault.value_or(what));
+}
+
 void Measurement::use_shot(FrameLease lease) {
+  if (!is_of_a_sound_scanner()) return;
   const geometry::RigidMotion world_from_scanner =
       scanner_motion_at(looked_at_.reported, settings_.tip_from_scanner);
   if (looked_at_.purpose == ShotPurpose::surface) {
@@ -332,7 +351,7 @@ void Measurement::track(const ShotOrder& order, const geometry::RigidMotion& wor
                      hal::Message::format("shot {}: {}", order.number, to_string(step.action)));
   switch (step.to) {
     case TrackState::failed:
-      return supervisor_.hold(
+      return hold_for_plate(
           step.action == TrackAction::report_too_large ? HoldCause::plan : HoldCause::measurement, step.text);
     case TrackState::closed:
       return apply(PhaseEvent::loop_closed);

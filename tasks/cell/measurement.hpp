@@ -18,6 +18,7 @@
 #include "tasks/machines/phases.hpp"
 #include "tasks/planning/height_model.hpp"
 #include "tasks/planning/scan_plan.hpp"
+#include "tasks/slices/frame_health.hpp"
 #include "tasks/slices/frame_lease.hpp"
 #include "tasks/slices/shot_view.hpp"
 #include "tasks/slices/surface_task.hpp"
@@ -87,6 +88,8 @@ class Measurement final : public ShotUser {
   void order_next() MOLDLOFT_NONBLOCKING;
   void hold_for_flaw(HoldCause) MOLDLOFT_NONBLOCKING;
   void use_shot(FrameLease) MOLDLOFT_NONBLOCKING;
+  bool is_of_a_sound_scanner() MOLDLOFT_NONBLOCKING;
+  void hold_for_plate(HoldCause, const hal::Message&) MOLDLOFT_NONBLOCKING;
   void keep_evidence(const geometry::RigidMotion& world_from_scanner, bool plate_found) MOLDLOFT_NONBLOCKING;
   std::optional<double> learn_heights(const geometry::RigidMotion& world_from_scanner) MOLDLOFT_NONBLOCKING;
   void track(const ShotOrder&, const geometry::RigidMotion& world_from_scanner,
@@ -115,6 +118,7 @@ class Measurement final : public ShotUser {
   std::size_t surface_planned_ = 0, surface_next_ = 0;
   ZigzagPlan zigzag_;
   bool plan_begun_ = false;  // the zig-zag's
+  FrameHealth health_;       // of the last frame
   std::array<int, 3> taken_{};
   std::uint64_t points_seen_ = 0;
   TimeLeft time_left_;

@@ -42,6 +42,7 @@ class ShotView {
   // Of the pieces, those that cost alike (BackgroundTask::next_kind()); 0 for the others.
   std::size_t next_kind() const MOLDLOFT_NONBLOCKING;
   bool found() const { return !runs_.empty(); }
+  const hal::Frame& frame() const { return *frame_; }  // that was begun last
 
   const geometry::BoundaryViewer::View& boundary() const { return boundary_; }
   std::span<const geometry::PlateRun> runs() const { return runs_; }
