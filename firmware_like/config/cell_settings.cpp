@@ -1,6 +1,7 @@
 #include "firmware_like/config/cell_settings.hpp"
 
 #include "firmware_like/config/device_makes.hpp"
+#include "geometry/edges/outline_check.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -93,6 +94,7 @@ tasks::SurfaceTaskSettings surface_settings(const CellConfig& c) {
   const tasks::CellSettings cell = cell_settings(c);
   tasks::SurfaceTaskSettings s;
   s.max_edge_points = cell.tracker.max_edge_points;
+  s.edge_limit_mm = geometry::outline_limit_mm(c.scanner.noise_mm);
   s.corners.max_candidates = static_cast<std::size_t>(cell.tracker.max_shots);
   s.max_boundary_shots = static_cast<std::size_t>(cell.tracker.max_shots) + 1;
   s.reserve_points_per_shot =

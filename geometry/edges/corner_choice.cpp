@@ -57,7 +57,9 @@ std::size_t CornerChoice::bytes() const {
   return ring_.capacity() * sizeof(Vector2d) + chosen_.capacity() * sizeof(Corner);
 }
 
-void CornerChoice::begin(std::span<const Vector2d> edges, std::span<const Vector2d> candidates) {
+void CornerChoice::begin(std::span<const Vector2d> edges, std::span<const Vector2d> candidates,
+                         double scale) {
+  scale_ = scale;
   edges_ = edges;
   candidates_ = candidates;
   chosen_.clear();
@@ -120,7 +122,7 @@ void CornerChoice::begin_round(const Vector2d& about) {
 bool CornerChoice::gather(std::span<const Vector2d> edges) {
   for (const auto& p : edges) {
     const double distance = (p - about_).norm();
-    if (distance < settings_.ring_inner_mm || distance > settings_.ring_outer_mm) continue;
+    if (distance < scale_ * settings_.ring_inner_mm || distance > scale_ * settings_.ring_outer_mm) continue;
     if (ring_.size() == ring_.capacity()) return true;
     ring_.push_back(p);
   }
@@ -169,7 +171,7 @@ bool CornerChoice::meet() {
   examined_.position =
       a.mean + cross(b.mean - a.mean, b.direction) / cross(a.direction, b.direction) * a.direction;
   return examined_.position.allFinite() &&
-         (examined_.position - candidates_[next_]).norm() <= settings_.ring_outer_mm;
+         (examined_.position - candidates_[next_]).norm() <= scale_ * settings_.ring_outer_mm;
 }
 
 void CornerChoice::end_round(bool is_corner) {
@@ -183,7 +185,7 @@ void CornerChoice::end_round(bool is_corner) {
 // Of corners that lie together the one whose branches are straightest is kept.
 void CornerChoice::keep(const Corner& corner) {
   for (auto& known : chosen_) {
-    if ((known.position - corner.position).norm() > settings_.merge_mm) continue;
+    if ((known.position - corner.position).norm() > scale_ * settings_.merge_mm) continue;
     if (corner.rms_mm < known.rms_mm) known = corner;
     return;
   }
@@ -191,13 +193,13 @@ void CornerChoice::keep(const Corner& corner) {
 }
 
 std::expected<void, Error> CornerChoice::arrange() {
-  if (chosen_.size() != 4) return std::unexpected(Error::not_four_sided);
   Vector2d middle = Vector2d::Zero();
-  for (const auto& corner : chosen_) middle += corner.position / 4;
+  for (const auto& corner : chosen_) middle += corner.position / static_cast<double>(chosen_.size());
   std::sort(chosen_.begin(), chosen_.end(), [&](const Corner& p, const Corner& q) {
     const Vector2d a = p.position - middle, b = q.position - middle;
     return std::atan2(a.y(), a.x()) < std::atan2(b.y(), b.x());
   });
+  if (chosen_.size() != 4) return std::unexpected(Error::not_four_sided);
   const auto side = [&](std::size_t i) {
     return (chosen_[(i + 1) % 4].position - chosen_[i % 4].position).norm();
   };

@@ -44,12 +44,18 @@ class CornerChoice {
  public:
   explicit CornerChoice(const CornerChoiceSettings&);
 
-  // Both spans are the caller's and must stay until the work is done.
-  void begin(std::span<const Eigen::Vector2d> edges,
-             std::span<const Eigen::Vector2d> candidates) MOLDLOFT_GEOMETRY_NONBLOCKING;
+  // Both spans are the caller's and must stay until the work is done. A `scale` below one looks at smaller rings for
+  // sides that the settings' ring goes beyond; it takes smaller teeth for corners.
+  void begin(std::span<const Eigen::Vector2d> edges, std::span<const Eigen::Vector2d> candidates,
+             double scale = 1) MOLDLOFT_GEOMETRY_NONBLOCKING;
   std::expected<bool, Error> step() MOLDLOFT_GEOMETRY_NONBLOCKING;  // true when the corners are chosen
   // Counter-clockwise; the side from the first to the second is one of the longer pair.
   const std::array<Eigen::Vector2d, 4>& corners() const { return corners_; }
+  // How many were left, four or not, and where; counter-clockwise about their middle.
+  std::size_t count() const MOLDLOFT_GEOMETRY_NONBLOCKING { return chosen_.size(); }
+  const Eigen::Vector2d& corner(std::size_t i) const MOLDLOFT_GEOMETRY_NONBLOCKING {
+    return chosen_[i].position;
+  }
   std::size_t bytes() const;
 
  private:
@@ -71,6 +77,7 @@ class CornerChoice {
   std::expected<void, Error> arrange();
 
   CornerChoiceSettings settings_;
+  double scale_ = 1;
   std::span<const Eigen::Vector2d> edges_, candidates_;
   std::vector<Eigen::Vector2d> ring_;
   std::vector<Corner> chosen_;

@@ -106,7 +106,8 @@ std::size_t OutlineBuilder::bytes() const {
 }
 
 std::expected<void, Error> OutlineBuilder::begin(std::span<const Eigen::Vector2d> points,
-                                                 std::span<const Eigen::Vector2d> corner_hints) {
+                                                 std::span<const Eigen::Vector2d> corner_hints,
+                                                 std::span<const std::uint8_t> left_out) {
   phase_ = Phase::idle;
   if (corner_hints.size() != 4) return std::unexpected(Error::not_four_sided);
   if (points.size() > side_of_.capacity()) return std::unexpected(Error::capacity);
@@ -125,7 +126,9 @@ std::expected<void, Error> OutlineBuilder::begin(std::span<const Eigen::Vector2d
     sides_[i].set_chord(corner_hints[i], corner_hints[(i + 1) % 4]);
     sides_[i].height = SideVector::Zero(settings_.spans + cubic);
   }
+  if (!left_out.empty() && left_out.size() != points.size()) return std::unexpected(Error::sizes_differ);
   points_ = points;
+  left_out_ = left_out;
   side_of_.assign(points.size(), no_side);
   residual_.assign(points.size(), 0.0);
   phase_ = Phase::assign;
@@ -180,7 +183,8 @@ void OutlineBuilder::assign_chunk() {
     const Eigen::Vector2d& p = points_[next_point_];
     std::uint8_t nearest = no_side;
     double least = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < 4; ++i) {
+    const bool is_out = !left_out_.empty() && left_out_[next_point_] != 0;
+    for (int i = 0; i < 4 && !is_out; ++i) {
       const Side& side = sides_[i];
       const double guard =
           round_ == 0 ? std::min(hint_doubt_mm, 0.1 * side.length) : settings_.corner_guard_mm;

@@ -48,11 +48,12 @@ class OutlineBuilder {
   ~OutlineBuilder();
   OutlineBuilder(OutlineBuilder&&) noexcept;
 
-  // `corner_hints`: the tracker's corners, counter-clockwise, good to a few millimetres. The points are the
-  // caller's and must stay until the work is done.
+  // `corner_hints`: the tracker's corners, counter-clockwise, good to a few millimetres. `left_out`: a point
+  // whose entry is not 0 belongs to no side; empty where all may. All are the caller's and must stay until
+  // the work is done.
   std::expected<void, Error> begin(std::span<const Eigen::Vector2d> points,
-                                   std::span<const Eigen::Vector2d> corner_hints)
-      MOLDLOFT_GEOMETRY_NONBLOCKING;
+                                   std::span<const Eigen::Vector2d> corner_hints,
+                                   std::span<const std::uint8_t> left_out = {}) MOLDLOFT_GEOMETRY_NONBLOCKING;
   std::expected<bool, Error> step() MOLDLOFT_GEOMETRY_NONBLOCKING;  // true when the outline is ready
   const Outline& outline() const { return outline_; }
   std::size_t bytes() const;
@@ -76,6 +77,7 @@ class OutlineBuilder {
   OutlineSettings settings_;
   Outline outline_;
   std::span<const Eigen::Vector2d> points_;
+  std::span<const std::uint8_t> left_out_;
   std::vector<std::uint8_t> side_of_;  // of every point, 4 for none
   std::vector<std::uint32_t> order_;   // points side by side
   std::vector<double> residual_, scratch_;

@@ -12,12 +12,13 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr std::size_t points_a_step = 128, bins_a_step = 512, feet_a_step = 1024;
+constexpr std::size_t points_a_step = 64, bins_a_step = 512, feet_a_step = 1024;
 constexpr std::size_t most_bins = 8192, most_runs = 128;
 constexpr double least_bin_mm = 2;  // edge points of one shot lie 1.4 mm apart
 constexpr int foot_iterations = 3;
 constexpr std::size_t fewest_teeth = 3;
 constexpr double small_corner_mm = 12;
+constexpr double least_spread = 0.15;   // of the chord; points all along it have 0.29
 constexpr std::size_t margin_bins = 2;  // a notch's walls stand over the ends of its mouth
 
 double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
@@ -33,11 +34,21 @@ struct Moments {
   }
 };
 
-double line_rms(const Moments& m) {
+struct LineSpread {
+  double along = 0, across = 0;  // standard deviations
+};
+
+LineSpread line_spread(const Moments& m) {
   const double xx = m.xx / m.n - m.x * m.x / (m.n * m.n), yy = m.yy / m.n - m.y * m.y / (m.n * m.n),
                xy = m.xy / m.n - m.x * m.y / (m.n * m.n);
-  const double middle = (xx + yy) / 2;
-  return std::sqrt(std::max(0.0, middle - std::hypot((xx - yy) / 2, xy)));
+  const double middle = (xx + yy) / 2, half = std::hypot((xx - yy) / 2, xy);
+  return {std::sqrt(middle + half), std::sqrt(std::max(0.0, middle - half))};
+}
+
+double chord_distance(const Vector2d& a, const Vector2d& b, const Vector2d& p) {
+  const Vector2d d = b - a;
+  const double share = std::clamp((p - a).dot(d) / d.squaredNorm(), 0.0, 1.0);
+  return (p - a - share * d).norm();
 }
 
 struct Arc {
@@ -118,6 +129,9 @@ std::expected<void, Error> OutlineCheck::begin(const Outline& outline, std::span
     const double length = (control.back() - control.front()).norm();
     if (!(length > 0)) return std::unexpected(Error::no_extent);
     station_[i + 1] = station_[i] + length;
+    bulge_[i] = 0;
+    for (const Vector2d& p : control)
+      bulge_[i] = std::max(bulge_[i], chord_distance(control.front(), control.back(), p));
   }
   settings_ = settings;
   outline_ = &outline;
@@ -125,6 +139,7 @@ std::expected<void, Error> OutlineCheck::begin(const Outline& outline, std::span
   bins_used_ = std::min<std::size_t>(most_bins, static_cast<std::size_t>(station_[4] / least_bin_mm) + 1);
   bin_mm_ = station_[4] / static_cast<double>(bins_used_);
   bins_.assign(bins_used_, {});
+  corner_gap_.fill(std::numeric_limits<double>::infinity());
   feet_.clear();
   runs_.clear();
   next_ = 0;
@@ -147,6 +162,7 @@ bool OutlineCheck::step() {
     case Stage::name:
       name_runs();
       join_teeth();
+      add_unseen_corners();
       stage_ = Stage::done;
       return true;
     case Stage::done:
@@ -162,6 +178,8 @@ OutlineCheck::Foot OutlineCheck::foot_of(const Vector2d& p) const {
   for (std::size_t i = 0; i < 4; ++i) {
     const PlanCurve& side = outline_->sides[i];
     const Vector2d start = side.control.front(), chord = side.control.back() - start;
+    // The side lies within the hull of its control points.
+    if (chord_distance(start, side.control.back(), p) - bulge_[i] > least) continue;
     const double first = side.begin(), last = side.end();
     double t = first + std::clamp((p - start).dot(chord) / chord.squaredNorm(), 0.0, 1.0) * (last - first);
     auto at = side.at(t);
@@ -197,14 +215,30 @@ void OutlineCheck::project_chunk() {
     const Foot foot = p.allFinite() ? foot_of(p) : Foot{};
     feet_.push_back(foot);
     if (!p.allFinite()) continue;
+    for (std::size_t i = 0; i < 4; ++i)
+      corner_gap_[i] = std::min(corner_gap_[i], (p - outline_->sides[i].control.front()).norm());
     Bin& bin = bins_[bin_of(foot.station)];
     ++(std::abs(foot.inwards) <= settings_.limit_mm ? bin.on : bin.off);
   }
   if (next_ < points_.size()) return;
-  const auto on = std::ranges::find_if(bins_, [](const Bin& bin) { return bin.on > 0; });
-  first_bin_ = on == bins_.end() ? 0 : static_cast<std::size_t>(on - bins_.begin());
+  first_bin_ = clean_bin();
   next_ = 0;
   stage_ = Stage::walk;
+}
+
+// A bin in the middle of a stretch where all points lie on the outline: no run goes across it. Where there is none, one
+// with points on the outline.
+std::size_t OutlineCheck::clean_bin() const {
+  constexpr std::size_t around = 6;
+  std::size_t any = 0, clean = 0;
+  for (std::size_t k = 0; k < 2 * bins_used_; ++k) {
+    const Bin& bin = bins_[k % bins_used_];
+    if (bin.on > 0) any = k % bins_used_;
+    clean = bin.off > 0 ? 0 : clean + 1;
+    const Bin& middle = bins_[(k + bins_used_ - around) % bins_used_];
+    if (clean > 2 * around && middle.on > 0) return (k + bins_used_ - around) % bins_used_;
+  }
+  return any;
 }
 
 // From a bin with points on the outline once round. Stretches without such bins are runs; bins that hold both kinds
@@ -266,7 +300,10 @@ void OutlineCheck::end_apart(std::size_t end) {
   std::size_t off = 0;
   for (std::size_t k = apart_begin_; k < end; ++k) off += bins_[(first_bin_ + k) % bins_used_].off;
   const double length = static_cast<double>(end - apart_begin_) * bin_mm_;
-  if (off < settings_.min_points || length < settings_.min_length_mm) {
+  const double from = unwrapped(apart_begin_), to = unwrapped(end);
+  // Two points inside a corner are not false by chance.
+  const bool is_corner = off >= 2 && to - from <= small_corner_mm && corner_between(from, to) >= 0;
+  if (!is_corner && (off < settings_.min_points || length < settings_.min_length_mm)) {
     longest_miss_mm_ = std::max(longest_miss_mm_, length);
     return;
   }
@@ -292,6 +329,18 @@ void OutlineCheck::drop_covered() {
   runs_.erase(std::remove_if(runs_.begin(), runs_.end(), covered), runs_.end());
 }
 
+// The one corner between two places along the boundary; -1 where there is none, or more.
+int OutlineCheck::corner_between(double begin, double end) const {
+  int corners = 0, found = -1;
+  for (int c = 0; c < 8; ++c) {
+    const double at = station_[static_cast<std::size_t>(c % 4)] + (c >= 4 ? station_[4] : 0);
+    if (at < begin - bin_mm_ || at > end + bin_mm_) continue;
+    ++corners;
+    found = c % 4;
+  }
+  return corners == 1 ? found : -1;
+}
+
 // Which corner a run goes round, and the place about which its points are summed.
 void OutlineCheck::place_runs() {
   for (Run& run : runs_) {
@@ -299,14 +348,7 @@ void OutlineCheck::place_runs() {
     run.reference = at_station((begin + end) / 2);
     // Where a corner lacks a few millimetres, the ends of its sides share their bins with what misses.
     if (run.beside && end - begin > small_corner_mm) continue;
-    int corners = 0;
-    for (int c = 0; c < 8; ++c) {
-      const double at = station_[static_cast<std::size_t>(c % 4)] + (c >= 4 ? station_[4] : 0);
-      if (at < begin - bin_mm_ || at > end + bin_mm_) continue;
-      ++corners;
-      run.corner = c % 4;
-    }
-    if (corners != 1) run.corner = -1;
+    run.corner = corner_between(begin, end);
     if (run.corner >= 0) run.beside = false;
     if (run.corner >= 0) run.reference = outline_->corners[static_cast<std::size_t>(run.corner)];
   }
@@ -349,9 +391,21 @@ void OutlineCheck::gather_chunk() {
   stage_ = Stage::name;
 }
 
+bool OutlineCheck::is_in_doubt(std::size_t point, double margin_mm) const {
+  const double station = feet_[point].station;
+  return std::ranges::any_of(runs_, [&](const Run& run) {
+    if (run.beside) return false;
+    const double begin = unwrapped(run.begin) - margin_mm, end = unwrapped(run.end) + margin_mm;
+    return (station >= begin && station <= end) ||
+           (station + station_[4] >= begin && station + station_[4] <= end) ||
+           (station - station_[4] >= begin && station - station_[4] <= end);
+  });
+}
+
 void OutlineCheck::name_runs() {
   std::sort(runs_.begin(), runs_.end(), [](const Run& a, const Run& b) { return a.begin < b.begin; });
   for (const Run& run : runs_) {
+    if (run.beside && run.points < settings_.min_points && run.corner < 0) continue;  // a neighbour's
     if (found_count_ == most_deviations) {
       ++more_;
       continue;
@@ -385,6 +439,7 @@ OutlineDeviation OutlineCheck::name_run(const Run& run) const {
 void OutlineCheck::describe_corner(const Run& run, OutlineDeviation& named) const {
   using Kind = OutlineDeviation::Kind;
   named.side = static_cast<std::uint8_t>(run.corner);
+  named.corner_gap_mm = corner_gap_[named.side];
   const double begin = unwrapped(run.begin), end = unwrapped(run.end);
   double corner = station_[named.side];
   if (corner < begin - bin_mm_) corner += station_[4];
@@ -392,15 +447,18 @@ void OutlineCheck::describe_corner(const Run& run, OutlineDeviation& named) cons
   named.kind = Kind::corner_missing;
   if (run.points < settings_.min_points || run.outwards > run.inwards) return;
   const double chord = std::hypot(named.leg_before_mm, named.leg_after_mm);
-  const double doubt = std::max(2 * settings_.limit_mm, 0.05 * chord);  // of the shape
+  const double doubt =
+      std::clamp(0.05 * chord, 2 * settings_.limit_mm, 4 * settings_.limit_mm);  // of the shape
   const PlanCurve& before = outline_->sides[(named.side + 3u) % 4];
   const PlanCurve& after = outline_->sides[named.side];
   const Vector2d back = -before.at(before.end()).first.normalized(),
                  on = after.at(after.begin()).first.normalized();
   const Vector2d middle = (back + on).normalized();
   const Arc arc = touching_arc(run.moments, middle / std::abs(cross(middle, on)), 4 * chord);
-  const double straight = line_rms(run.moments);
-  if (straight <= arc.rms && straight < doubt) {
+  const LineSpread line = line_spread(run.moments);
+  // Points in one place of the gap tell nothing of its shape.
+  if (line.along < least_spread * chord) return;
+  if (line.across <= arc.rms && line.across < doubt) {
     named.kind = Kind::corner_cut;
   } else if (arc.rms < doubt) {
     named.kind = Kind::corner_rounded;
@@ -443,6 +501,35 @@ void OutlineCheck::join_teeth() {
     found_[kept++] = joined;
   }
   found_count_ = kept;
+}
+
+// A corner in whose place an arc or a cut was seen is named already.
+void OutlineCheck::add_unseen_corners() {
+  // A scanner with stripes farther apart sees fewer points, of corners too.
+  const double spacing = station_[4] / static_cast<double>(std::max<std::size_t>(1, points_.size()));
+  const double allowed = std::max(settings_.corner_gap_mm, 4 * spacing);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Vector2d& corner = outline_->sides[i].control.front();
+    const auto covers = [&](const Run& run) {
+      const double begin = unwrapped(run.begin) - bin_mm_, end = unwrapped(run.end) + bin_mm_;
+      const double near = station_[i], far = station_[i] + station_[4];
+      return !run.beside && ((near >= begin && near <= end) || (far >= begin && far <= end));
+    };
+    const bool is_named = std::ranges::any_of(runs_, covers);
+    if (corner_gap_[i] <= allowed || is_named) continue;
+    if (found_count_ == most_deviations) {
+      ++more_;
+      continue;
+    }
+    OutlineDeviation& d = found_[found_count_++];
+    d = {
+        .kind = OutlineDeviation::Kind::corner_unseen, .place = corner, .side = static_cast<std::uint8_t>(i)};
+    const double gap = std::min(corner_gap_[i], station_[4] / 4);
+    d.from = at_station(station_[i] - gap + station_[4]), d.to = at_station(station_[i] + gap);
+    d.length_mm = 2 * gap;
+    d.corner_gap_mm = gap;
+    d.leg_before_mm = d.leg_after_mm = gap;
+  }
 }
 
 std::expected<std::vector<OutlineDeviation>, Error> check_outline(const Outline& outline,

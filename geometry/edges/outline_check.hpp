@@ -6,7 +6,7 @@
 // torn edge misses in many short places, a cut corner in one long one.
 //
 // Frame        plan view, mm; the outline counter-clockwise, so that its left is inside
-// Cost         of a point 0.5 us; step() does one bounded piece (128 points, or 512 bins of the boundary)
+// Cost         of a point 0.3 us; step() does one bounded piece (64 points, or 512 bins of the boundary)
 // Allocation   OutlineCheck in its constructor only; check_outline() is for reports and allocates
 // Failure      Error::capacity with more points than planned, not_finite, no_extent (a side without length)
 #pragma once
@@ -17,6 +17,7 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <expected>
@@ -32,6 +33,7 @@ struct OutlineDeviation {
     corner_rounded,  // an arc where the corner should be: radius_mm
     corner_missing,  // neither: a piece is out of the corner, or the corner lies elsewhere
     ragged,          // one step after the other: teeth, scallops, waves
+    corner_unseen,   // no edge point near the corner: the sides meet there, whatever the plate does
     unseen,          // no edge point near the outline, and none beside it
     apart,           // edge points beside the outline where others lie on it: a hole, a part on the plate,
                      // shots that disagree
@@ -43,18 +45,23 @@ struct OutlineDeviation {
   double length_mm = 0;                    // of the boundary, from `from` counter-clockwise to `to`
   double inwards_mm = 0, outwards_mm = 0;  // the farthest edge points on either side; 0 when there is none
   double leg_before_mm = 0, leg_after_mm = 0;  // corner_*: how much of either side is gone
-  double radius_mm = 0;                        // corner_rounded
-  std::uint8_t side = 0;                       // 0 to 3, or of a corner the side that begins there
-  std::uint32_t points = 0;                    // edge points that miss
+  double corner_gap_mm = 0;  // corner_*: from where the sides meet to the nearest edge point
+  double radius_mm = 0;      // corner_rounded
+  std::uint8_t side = 0;     // 0 to 3, or of a corner the side that begins there
+  std::uint32_t points = 0;  // edge points that miss
   double distance_mm() const { return inwards_mm > outwards_mm ? inwards_mm : outwards_mm; }
+  // Both ways: of the edge points from the outline, and of the outline's corner from them.
+  double farthest_mm() const { return corner_gap_mm > distance_mm() ? corner_gap_mm : distance_mm(); }
 };
 
 struct OutlineCheckSettings {
   double limit_mm = 0.5;     // an edge point farther from the outline than this misses
-  double min_length_mm = 4;  // misses over less than this of the boundary are single false points
+  double min_length_mm = 3;  // misses over less than this of the boundary are single false points
   double unseen_mm = 25;     // so much of the boundary may go without edge points
-  double tooth_mm = 60;      // steps of a side that follow each other closer than this are one ragged rim
-  std::uint32_t min_points = 4;
+  double corner_gap_mm =
+      4.1;               // the edge point nearest to a corner may be so far from it: four stripe pitches
+  double tooth_mm = 60;  // steps of a side that follow each other closer than this are one ragged rim
+  std::uint32_t min_points = 3;
 };
 
 // The limit that the noise of an edge point allows: no less than 0.5 mm, five times the noise where that is more.
@@ -75,10 +82,13 @@ class OutlineCheck {
   // Along the boundary from the first corner. Where there are more than most_deviations, the rest is in more().
   std::span<const OutlineDeviation> deviations() const { return {found_.data(), found_count_}; }
   std::size_t more() const { return more_; }
+  // Whether the edge point's foot lies in a stretch that misses, or nearer than `margin_mm` to one.
+  bool is_in_doubt(std::size_t point, double margin_mm) const MOLDLOFT_GEOMETRY_NONBLOCKING;
   // The longest stretch that missed but was too short to be named, and the longest without edge points: how far a good
   // plate is from being named.
   double longest_miss_mm() const { return longest_miss_mm_; }
   double longest_unseen_mm() const { return longest_unseen_mm_; }
+  double widest_corner_gap_mm() const { return *std::ranges::max_element(corner_gap_); }
   std::size_t bytes() const;
 
  private:
@@ -101,12 +111,17 @@ class OutlineCheck {
   OutlineDeviation name_run(const Run&) const;
   void describe_corner(const Run&, OutlineDeviation&) const;
   void join_teeth();
+  void add_unseen_corners();
   Eigen::Vector2d at_station(double station) const;
   std::size_t bin_of(double station) const;
+  std::size_t clean_bin() const;
+  int corner_between(double begin, double end) const;
 
   OutlineCheckSettings settings_;
   const Outline* outline_ = nullptr;
   std::span<const Eigen::Vector2d> points_;
+  std::array<double, 4> bulge_{};  // how far each side may leave its chord
+  std::array<double, 4> corner_gap_{};
   std::array<double, 5> station_{};  // where each side begins along the boundary; [4] is its length
   double bin_mm_ = 1;
   std::size_t bins_used_ = 0, next_ = 0, first_bin_ = 0;

@@ -1,6 +1,7 @@
 #include "tasks/cell/measurement.hpp"
 
 #include "hal/base/reserved.hpp"
+#include "tasks/planning/flaw_words.hpp"
 #include "tasks/planning/tool_pose.hpp"
 
 #include <algorithm>
@@ -177,8 +178,7 @@ void Measurement::scan() {
 }
 
 void Measurement::hold_for_flaw(HoldCause cause) {
-  hold_for_plate(cause,
-                 hal::Message::format("{}: {}", to_string(phase_), geometry::to_string(surface_.error())));
+  hold_for_plate(cause, flaw_words(surface_.error(), surface_.outline_search(), tracker_.edge_points()));
 }
 
 // The background work finds the plate in the frame, and may begin before all of it is there. use_view() follows when

@@ -1,5 +1,7 @@
 #include "tasks/planning/outline_words.hpp"
 
+#include "geometry/edges/outline_search.hpp"
+
 #include <algorithm>
 
 namespace moldloft::tasks {
@@ -52,6 +54,11 @@ hal::Message words_of(const geometry::OutlineDeviation& d) {
     case Kind::ragged:
       return hal::Message::format("a ragged rim, up to {}, from ({:.0f}, {:.0f}) to ({:.0f}, {:.0f})",
                                   mm(d.distance_mm()).view(), d.from.x(), d.from.y(), d.to.x(), d.to.y());
+    case Kind::corner_unseen:
+      return hal::Message::format(
+          "nothing of the edge was seen within {} of the corner at ({:.0f}, {:.0f}): it may be rounded or "
+          "cut",
+          mm(d.leg_after_mm).view(), x, y);
     case Kind::unseen:
       return hal::Message::format("{} of the edge at ({:.0f}, {:.0f}) were not seen", mm(d.length_mm).view(),
                                   x, y);
@@ -61,6 +68,40 @@ hal::Message words_of(const geometry::OutlineDeviation& d) {
           mm(d.distance_mm()).view(), inwards ? "inside" : "outside", x, y);
   }
   return {};
+}
+
+namespace {
+
+// The edge lies along the sides between these corners: they are the plate's.
+constexpr double whole_share = 0.97;
+
+hal::FixedText<80> places(std::span<const Eigen::Vector2d> corners) {
+  hal::FixedText<80> list;
+  for (const auto& c : corners) {
+    const auto longer = hal::FixedText<80>::format("{}{}({:.0f}, {:.0f})", list.view(),
+                                                   list.empty() ? "" : ", ", c.x(), c.y());
+    if (longer.view().size() == list.view().size() || longer.view().back() != ')') break;
+    list = longer;
+  }
+  return list;
+}
+
+}  // namespace
+
+hal::Message words_of(const geometry::OutlineSearch& search) {
+  constexpr std::string_view what_to_do = "only plates with four sides are measured";
+  const auto corners = search.corners();
+  if (search.share_along() >= whole_share && corners.size() != 4)
+    return hal::Message::format("the plate has {} corners, {}: {}", corners.size(), places(corners).view(),
+                                what_to_do);
+  if (const auto* worst = search.worst())
+    return hal::Message::format("{}: {}", words_of(*worst).view(), what_to_do);
+  if (corners.empty())
+    return hal::Message::format("the plate's edge is round, it has no corners: {}", what_to_do);
+  return hal::Message::format(
+      "{} corners were found, {}, but only {:.0f} % of the edge lie on lines between them: {}",
+      corners.size(), places(corners.first(std::min<std::size_t>(corners.size(), 2))).view(),
+      100 * search.share_along(), what_to_do);
 }
 
 }  // namespace moldloft::tasks

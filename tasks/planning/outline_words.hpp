@@ -9,9 +9,17 @@
 #include "hal/base/fixed_text.hpp"
 #include "hal/base/realtime.hpp"
 
+namespace moldloft::geometry {
+class OutlineSearch;
+}
+
 namespace moldloft::tasks {
 
 // "a step of 40 mm inwards over 100 mm of the side at (412, 88)": what was seen. What to do, the caller adds.
 hal::Message words_of(const geometry::OutlineDeviation&) MOLDLOFT_NONBLOCKING;
+
+// Why a plate is not measured whose outline is not four-sided: how many corners it has and where, or what is farthest
+// off the four sides, and what to do.
+hal::Message words_of(const geometry::OutlineSearch&) MOLDLOFT_NONBLOCKING;
 
 }  // namespace moldloft::tasks

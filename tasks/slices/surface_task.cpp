@@ -1,5 +1,6 @@
 #include "tasks/slices/surface_task.hpp"
 
+#include "geometry/edges/outline_search.hpp"
 #include "hal/base/reserved.hpp"
 
 #include <algorithm>
@@ -10,12 +11,19 @@ namespace moldloft::tasks {
 
 SurfaceTask::SurfaceTask(const SurfaceTaskSettings& settings)
     : settings_{settings},
-      corners_{settings.corners},
-      outline_{settings.max_edge_points, settings.outline},
+      outline_{std::make_unique<geometry::OutlineSearch>(
+          settings.max_edge_points, settings.corners, settings.outline,
+          geometry::OutlineSearchSettings{.check = {.limit_mm = settings.edge_limit_mm}})},
       fit_{settings.fit} {
   reserve_.reserve(settings.max_boundary_shots * settings.reserve_points_per_shot);
   reserve_ends_.reserve(settings.max_boundary_shots);
 }
+
+SurfaceTask::~SurfaceTask() = default;
+
+const geometry::Outline& SurfaceTask::outline() const { return outline_->outline(); }
+
+std::size_t SurfaceTask::outline_bytes() const { return outline_->bytes(); }
 
 void SurfaceTask::begin() {
   stage_ = Stage::idle;
@@ -59,8 +67,8 @@ void SurfaceTask::build_outline(std::span<const Eigen::Vector2d> edges,
                                 std::span<const Eigen::Vector2d> corner_candidates) {
   edges_ = edges;
   map_row_ = -1;
-  corners_.begin(edges, corner_candidates);
-  stage_ = Stage::choosing_corners;
+  outline_->begin(edges, corner_candidates);
+  stage_ = Stage::building_outline;
 }
 
 void SurfaceTask::fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner, FrameLease lease) {
@@ -79,9 +87,9 @@ void SurfaceTask::solve() {
 }
 
 bool SurfaceTask::has_work() const {
-  return can_look() || keeping() || planning() || stage_ == Stage::choosing_corners ||
-         stage_ == Stage::building_outline || stage_ == Stage::clearing || stage_ == Stage::folding_reserve ||
-         stage_ == Stage::folding || stage_ == Stage::solving;
+  return can_look() || keeping() || planning() || stage_ == Stage::building_outline ||
+         stage_ == Stage::clearing || stage_ == Stage::folding_reserve || stage_ == Stage::folding ||
+         stage_ == Stage::solving;
 }
 
 void SurfaceTask::step(Instant) {
@@ -95,8 +103,6 @@ void SurfaceTask::step(Instant) {
     return;
   }
   switch (stage_) {
-    case Stage::choosing_corners:
-      return step_corners();
     case Stage::building_outline:
       return step_outline();
     case Stage::clearing:
@@ -119,20 +125,12 @@ void SurfaceTask::fail(geometry::Error error) {
   stage_ = Stage::failed;
 }
 
-void SurfaceTask::step_corners() {
-  const auto chosen = corners_.step();
-  if (!chosen) return fail(chosen.error());
-  if (!*chosen) return;
-  stage_ = Stage::building_outline;
-  if (const auto begun = outline_.begin(edges_, corners_.corners()); !begun) fail(begun.error());
-}
-
 void SurfaceTask::step_outline() {
   if (map_row_ < 0) {
-    const auto done = outline_.step();
+    const auto done = outline_->step();
     if (!done) return fail(done.error());
     if (!*done) return;
-    map_.assign(outline_.outline());
+    map_.assign(outline_->outline());
     map_row_ = 0;
     return;
   }

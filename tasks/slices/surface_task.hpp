@@ -26,14 +26,20 @@
 
 #include <array>
 #include <expected>
+#include <memory>
 #include <span>
 #include <vector>
+
+namespace moldloft::geometry {
+class OutlineSearch;
+}
 
 namespace moldloft::tasks {
 
 struct SurfaceTaskSettings {
   geometry::CornerChoiceSettings corners;
   geometry::OutlineSettings outline;
+  double edge_limit_mm = 0.5;  // an edge point farther from the outline than this is named
   geometry::SurfaceFitSettings fit;
   std::size_t max_edge_points = 24000;
   std::size_t max_boundary_shots = 96;
@@ -45,7 +51,6 @@ class SurfaceTask final : public BackgroundTask {
  public:
   enum class Stage : std::uint8_t {
     idle,
-    choosing_corners,
     building_outline,
     clearing,  // of what the surface before left; the outline is ready
     folding_reserve,
@@ -57,6 +62,7 @@ class SurfaceTask final : public BackgroundTask {
   };
 
   explicit SurfaceTask(const SurfaceTaskSettings&);
+  ~SurfaceTask() override;
 
   void begin() MOLDLOFT_NONBLOCKING;
   // Looks at the frame that `shot` has begun; looking() turns false when its view is there. Goes before all
@@ -88,12 +94,14 @@ class SurfaceTask final : public BackgroundTask {
   bool prepares() const { return stage_ == Stage::clearing || stage_ == Stage::folding_reserve; }
   bool outline_ready() const { return stage_ >= Stage::clearing && stage_ != Stage::failed; }
   geometry::Error error() const { return error_; }
-  const geometry::Outline& outline() const { return outline_.outline(); }
+  const geometry::Outline& outline() const;
+  // After Error::not_four_sided: what was found instead.
+  const geometry::OutlineSearch& outline_search() const { return *outline_; }
   const geometry::SurfaceFit& fit() const { return fit_; }
   int shots() const { return shots_; }
   double progress() const { return fit_.progress(); }
 
-  std::size_t outline_bytes() const { return corners_.bytes() + outline_.bytes(); }
+  std::size_t outline_bytes() const;
   std::size_t fit_bytes() const { return fit_.bytes(); }
   std::size_t reserve_bytes() const { return reserve_.capacity() * sizeof(Eigen::Vector3d); }
   std::size_t reserve_used_bytes() const { return reserve_.size() * sizeof(Eigen::Vector3d); }
@@ -106,15 +114,13 @@ class SurfaceTask final : public BackgroundTask {
   bool can_look() const MOLDLOFT_NONBLOCKING { return looking() && !looking_at_->waits(); }
   void fail(geometry::Error error);
   void step_keep() MOLDLOFT_NONBLOCKING;
-  void step_corners();
   void step_outline();
   void step_reserve();
   void step_fold();
   void step_solve();
 
   SurfaceTaskSettings settings_;
-  geometry::CornerChoice corners_;
-  geometry::OutlineBuilder outline_;
+  std::unique_ptr<geometry::OutlineSearch> outline_;
   geometry::PlanMap map_;
   geometry::SurfaceFit fit_;
   std::span<const Eigen::Vector2d> edges_;

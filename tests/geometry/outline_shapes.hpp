@@ -4,6 +4,9 @@
 #include "geometry/edges/outline.hpp"
 
 #include <array>
+#include <cmath>
+#include <random>
+#include <vector>
 
 namespace moldloft::test {
 
@@ -32,6 +35,21 @@ inline geometry::Outline bent_outline() {
     }
   }
   return outline;
+}
+
+// What a scanner sees of a closed polygon: a point every 1.4 mm, with noise.
+inline std::vector<Eigen::Vector2d> seen(const std::vector<Eigen::Vector2d>& border, double noise = 0.05,
+                                         unsigned seed = 1) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> off(0, noise);
+  std::vector<Eigen::Vector2d> points;
+  for (std::size_t i = 0; i < border.size(); ++i) {
+    const Eigen::Vector2d a = border[i], d = border[(i + 1) % border.size()] - a;
+    const int n = static_cast<int>(std::ceil(d.norm() / 1.4));
+    for (int k = 0; k < n; ++k)
+      points.push_back(a + (k + 0.5) / n * d + Eigen::Vector2d(off(random), off(random)));
+  }
+  return points;
 }
 
 }  // namespace moldloft::test

@@ -9,7 +9,7 @@ import sys
 tree = pathlib.Path(sys.argv[1])
 # Where a hold, an abort or a lost device gets its words.
 speakers = ["tasks/machines/boundary_tracker.cpp", "tasks/cell/cell.cpp", "tasks/cell/device_words.cpp", "tasks/cell/disk_wait.cpp", "tasks/cell/measurement.cpp",
-            "tasks/cell/shot_taker.cpp", "tasks/cell/supervisor.cpp", "tasks/cell/motion_guard.cpp", "firmware_like/results/audit.cpp", "tasks/slices/surface_task.cpp", "tasks/slices/frame_health.cpp", "firmware_like/controller/controller.cpp", "hal/robot/line_robot.cpp",
+            "tasks/cell/shot_taker.cpp", "tasks/cell/supervisor.cpp", "tasks/cell/motion_guard.cpp", "firmware_like/results/audit.cpp", "tasks/planning/flaw_words.cpp", "tasks/planning/outline_words.cpp", "tasks/slices/surface_task.cpp", "tasks/slices/frame_health.cpp", "firmware_like/controller/controller.cpp", "hal/robot/line_robot.cpp",
             "hal/scanner/psc_scanner.cpp", "hal/record/recorder.cpp", "hal/links/serial_link.cpp", "hal/links/tcp_link.cpp"]
 
 

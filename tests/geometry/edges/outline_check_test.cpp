@@ -8,30 +8,17 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <random>
 
 using namespace moldloft;
 using namespace moldloft::geometry;
 using Eigen::Vector2d;
+using test::seen;
 using Kind = OutlineDeviation::Kind;
 
 namespace {
 
 // 400 x 300 mm, a corner at the origin.
 const std::array<Vector2d, 4> rectangle{Vector2d(0, 0), {400, 0}, {400, 300}, {0, 300}};
-
-// What a scanner sees of a closed polygon: a point every 1.4 mm, with noise.
-std::vector<Vector2d> seen(const std::vector<Vector2d>& border, double noise = 0.05, unsigned seed = 1) {
-  std::mt19937 random(seed);
-  std::normal_distribution<double> off(0, noise);
-  std::vector<Vector2d> points;
-  for (std::size_t i = 0; i < border.size(); ++i) {
-    const Vector2d a = border[i], d = border[(i + 1) % border.size()] - a;
-    const int n = static_cast<int>(std::ceil(d.norm() / 1.4));
-    for (int k = 0; k < n; ++k) points.push_back(a + (k + 0.5) / n * d + Vector2d(off(random), off(random)));
-  }
-  return points;
-}
 
 std::vector<OutlineDeviation> check(const std::vector<Vector2d>& points,
                                     const Outline& outline = test::straight_outline(rectangle)) {
@@ -148,6 +135,17 @@ TEST_CASE("a part of the outline that nobody saw is named, one false point is no
   CHECK(named[0].side == 2);
   CHECK((named[0].place - Vector2d(120, 300)).norm() < 5);
   CHECK(std::abs(named[0].length_mm - 40) < 5);
+}
+
+TEST_CASE("a corner that nobody saw is named with how near the edge was seen") {
+  std::vector<Vector2d> points = seen({rectangle.begin(), rectangle.end()});
+  std::erase_if(points, [](const Vector2d& p) { return (p - Vector2d(400, 300)).norm() < 6; });
+  const auto named = check(points);
+  REQUIRE(named.size() == 1);
+  CHECK(named[0].kind == Kind::corner_unseen);
+  CHECK((named[0].place - Vector2d(400, 300)).norm() < 1e-9);
+  CHECK(named[0].leg_after_mm > 6);
+  CHECK(named[0].leg_after_mm < 7.5);
 }
 
 TEST_CASE("a hole beside a side that is seen lies apart") {

@@ -35,6 +35,8 @@ TEST_CASE("each way in which an edge leaves its outline has words with the place
         "the plate goes on beyond the corner at (-7, 300), by up to 57 mm");
   CHECK(words({.kind = Kind::ragged, .from = {10, 0}, .to = {300, 2}, .outwards_mm = 8.25}) ==
         "a ragged rim, up to 8.2 mm, from (10, 0) to (300, 2)");
+  CHECK(words({.kind = Kind::corner_unseen, .place = {-7, 300}, .leg_after_mm = 8.6}) ==
+        "nothing of the edge was seen within 8.6 mm of the corner at (-7, 300): it may be rounded or cut");
   CHECK(words({.kind = Kind::unseen, .place = {120, 300}, .length_mm = 40}) ==
         "40 mm of the edge at (120, 300) were not seen");
   CHECK(words({.kind = Kind::apart, .place = {200, 40}, .inwards_mm = 50}) ==
