@@ -41,12 +41,18 @@ void read_place(TomlSection& s, LinkConfig& c) {
   s.integer("baud", c.baud, 1200, 921600);
 }
 
+// A make with one encoding only has no such key. Where the make is not known, nothing is said of its encoding.
+void read_encoding(TomlSection& s, ScannerConfig& c) {
+  const ScannerMake* make = find_scanner_make(c.driver);
+  if (make == nullptr) return s.text("encoding", c.encoding);
+  c.encoding = make->encodings.empty() ? "" : make->encodings.front();
+  if (!make->encodings.empty()) s.choice("encoding", c.encoding, make->encodings);
+}
+
 void read_scanner(TomlSection s, ScannerConfig& c) {
   s.choice("driver", c.driver, scanner_names());
   read_place(s, c.place);
-  std::string encoding = "int16";
-  s.choice("encoding", encoding, {"int16", "float32"});
-  c.encoding = encoding == "int16" ? hal::psc1::Encoding::int16 : hal::psc1::Encoding::float32;
+  read_encoding(s, c);
   s.integer("max_stripes", c.max_stripes, 1, 1000);
   s.integer("max_points_per_stripe", c.max_points_per_stripe, 8, 4096);
   std::array<double, 2> field{c.field_x_mm, c.field_y_mm};

@@ -8,8 +8,6 @@
 #include "firmware_like/config/config_rules.hpp"
 #include "firmware_like/config/device_links.hpp"
 #include "firmware_like/config/realtime_config.hpp"
-#include "hal/robot/robot_line.hpp"
-#include "hal/scanner/psc1.hpp"
 #include "tasks/cell/cell.hpp"
 
 #include <array>
@@ -24,14 +22,17 @@ namespace moldloft::firmware_like {
 // turned by half a turn.
 inline constexpr std::array<double, 3> default_mount_mm{0, 140, 300}, default_mount_zyz_deg{0, 180, 180};
 
+// TCP ports of the makes that are meant where nothing is said (hal/PROTOCOLS.md).
+inline constexpr int default_scanner_port = 4014, default_robot_port = 4015;
+
 struct ConfigError {
   std::string what;  // "cell.toml:12: [robot] baud: ...", a line for each error
 };
 
 struct ScannerConfig {
   std::string driver = "psc1";
-  LinkConfig place{.link = "tcp", .port = hal::psc1::default_port};
-  hal::psc1::Encoding encoding = hal::psc1::Encoding::int16;
+  LinkConfig place{.link = "tcp", .port = default_scanner_port};
+  std::string encoding = "int16";  // of the points on the link: one of its make's words (device_makes.hpp)
   int max_stripes = 100;
   int max_points_per_stripe = 500;
   double field_x_mm = 102, field_y_mm = 102;
@@ -42,7 +43,7 @@ struct ScannerConfig {
 
 struct RobotConfig {
   std::string driver = "line";
-  LinkConfig place{.link = "serial", .port = hal::robot_line::default_port};
+  LinkConfig place{.link = "serial", .port = default_robot_port};
   int speed_percent = 100;
   double repeatability_z_mm = 0.013;
   tasks::Workspace workspace;

@@ -11,9 +11,22 @@
 namespace moldloft::firmware_like {
 namespace {
 
+static_assert(default_scanner_port == hal::psc1::default_port);
+static_assert(default_robot_port == hal::robot_line::default_port);
+
+// A configuration that is refused for this word is looked at all the same, for what else is wrong with it.
+hal::psc1::Encoding psc_encoding(const ScannerConfig& config) {
+  return hal::psc1::encoding_named(config.encoding).value_or(hal::psc1::Encoding::int16);
+}
+
+std::vector<std::string> psc_encodings() {
+  using hal::psc1::Encoding;
+  return {std::string{to_string(Encoding::int16)}, std::string{to_string(Encoding::float32)}};
+}
+
 std::unique_ptr<hal::Scanner> psc_scanner(const ScannerConfig& config, hal::ByteLink& link) {
   hal::PscScanner::Settings s;
-  s.encoding = config.encoding;
+  s.encoding = psc_encoding(config);
   s.max_stripes = static_cast<std::uint32_t>(config.max_stripes);
   s.max_points = static_cast<std::uint32_t>(config.max_stripes * config.max_points_per_stripe);
   return std::make_unique<hal::PscScanner>(link, s);
@@ -22,7 +35,7 @@ std::unique_ptr<hal::Scanner> psc_scanner(const ScannerConfig& config, hal::Byte
 std::size_t largest_psc_frame(const ScannerConfig& config) {
   const auto stripes = static_cast<std::size_t>(config.max_stripes);
   const auto points = stripes * static_cast<std::size_t>(config.max_points_per_stripe);
-  return hal::psc1::largest_message(stripes, points, config.encoding);
+  return hal::psc1::largest_message(stripes, points, psc_encoding(config));
 }
 
 std::unique_ptr<hal::Robot> line_robot(const RobotConfig& config, hal::ByteLink& link, std::uint32_t nonce) {
@@ -33,7 +46,7 @@ std::unique_ptr<hal::Robot> line_robot(const RobotConfig& config, hal::ByteLink&
 std::vector<ScannerMake>& scanners() {
   static std::vector<ScannerMake> makes = {
       {"psc1", &hal::psc1::frame_codec, largest_psc_frame, psc_scanner,
-       hal::PscScanner::Settings{}.frame_timeout},
+       hal::PscScanner::Settings{}.frame_timeout, psc_encodings()},
   };
   return makes;
 }

@@ -27,6 +27,8 @@ struct ScannerMake {
   std::size_t (*largest_frame_bytes)(const ScannerConfig&) = nullptr;
   std::unique_ptr<hal::Scanner> (*driver)(const ScannerConfig&, hal::ByteLink&) = nullptr;
   hal::Duration frame_timeout = std::chrono::seconds{2};  // how long the driver waits for a whole frame
+  // What [scanner] encoding may say, the default first. A make with one encoding only gives none.
+  std::vector<std::string> encodings = {};
 };
 
 struct RobotMake {

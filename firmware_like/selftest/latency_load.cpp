@@ -123,7 +123,9 @@ std::vector<LatencyLoad::Shot> LatencyLoad::shots_of_a_plate(const CellConfig& c
 }
 
 std::vector<std::byte> LatencyLoad::on_the_wire(const CellConfig& config, const hal::Frame& frame) {
-  const auto encoding = config.scanner.encoding;
+  // Of another make's configuration the sizes count, not its words.
+  const auto encoding =
+      hal::psc1::encoding_named(config.scanner.encoding).value_or(hal::psc1::Encoding::int16);
   std::vector<std::byte> bytes(hal::psc1::encoded_frame_size(frame, encoding, true));
   const std::array<float, 3> half{static_cast<float>(config.scanner.field_x_mm / 2),
                                   static_cast<float>(config.scanner.field_y_mm / 2),

@@ -78,6 +78,15 @@ std::string_view to_string(Flaw flaw) {
   return "unknown flaw";
 }
 
+std::string_view to_string(Encoding encoding) { return encoding == Encoding::int16 ? "int16" : "float32"; }
+
+std::optional<Encoding> encoding_named(std::string_view name) {
+  for (const Encoding encoding : {Encoding::int16, Encoding::float32}) {
+    if (to_string(encoding) == name) return encoding;
+  }
+  return std::nullopt;
+}
+
 std::string_view to_string(Status status) {
   constexpr std::array<std::string_view, 7> names = {"OK",   "BAD_STATE",    "BAD_ARGUMENT", "UNSUPPORTED",
                                                      "BUSY", "SENSOR_FAULT", "TIMEOUT"};

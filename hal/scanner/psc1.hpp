@@ -15,7 +15,9 @@
 #include <array>
 #include <cstdint>
 #include <expected>
+#include <optional>
 #include <span>
+#include <string_view>
 
 namespace moldloft::hal::psc1 {
 
@@ -64,6 +66,8 @@ enum class Flaw {
 };
 std::string_view to_string(Flaw) MOLDLOFT_NONBLOCKING;
 std::string_view to_string(Status) MOLDLOFT_NONBLOCKING;  // its name in PROTOCOLS.md
+std::string_view to_string(Encoding) MOLDLOFT_NONBLOCKING;
+std::optional<Encoding> encoding_named(std::string_view) MOLDLOFT_NONBLOCKING;
 
 struct Header {
   Type type{};

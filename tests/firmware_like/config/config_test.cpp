@@ -53,8 +53,8 @@ std::string values(const CellConfig& c) {
          fmt::format("{} {} {} {:.9f} ", c.scanner_wait.count(), c.disk_wait.count(),
                      c.robot.arrival.distance_mm, c.robot.arrival.turn_rad) +
          fmt::format("{} {} {} {} {} {} {} {} {} {} {} ", s.driver, s.place.link + s.place.host, s.place.port,
-                     static_cast<int>(s.encoding), s.max_stripes, s.max_points_per_stripe, s.field_x_mm,
-                     s.field_y_mm, s.noise_mm, s.depth_mm, mount) +
+                     s.encoding, s.max_stripes, s.max_points_per_stripe, s.field_x_mm, s.field_y_mm,
+                     s.noise_mm, s.depth_mm, mount) +
          fmt::format("{} {} {} {} {} ", c.robot.driver, c.robot.place.link + c.robot.place.device,
                      c.robot.place.baud, c.robot.speed_percent, c.robot.repeatability_z_mm) +
          fmt::format("{} {} {} {} {} {} ", range(w.x_mm), range(w.y_mm), range(w.z_mm), range(w.reach_mm),
@@ -65,8 +65,8 @@ std::string values(const CellConfig& c) {
                      c.start.head_yaw) +
          fmt::format("{} {} {} {} ", c.tracking_overlap_mm, c.tracking_crossing_deg, c.seek_step_mm,
                      c.seek_limit_mm) +
-         fmt::format("{} {} {} {} {} ", c.scan_overlap_mm, c.scan_margin_mm, c.unseen_percent, c.finest_span_mm,
-                     c.fit_tolerance_mm) +
+         fmt::format("{} {} {} {} {} ", c.scan_overlap_mm, c.scan_margin_mm, c.unseen_percent,
+                     c.finest_span_mm, c.fit_tolerance_mm) +
          fmt::format("{} {} {} {} {}", c.realtime.lock_memory, c.realtime.heap_reserve_mib,
                      c.realtime.priority, c.realtime.cpu, c.realtime.cpu_latency_us);
 }
@@ -186,7 +186,8 @@ TEST_CASE("what is wrong is told in one line with file, line, key and what is al
         "host, link, port, "
         "repeatability_z_mm, speed_percent, workspace");
   CHECK(refusal("\nrobots = 1\n") ==
-        "cell.toml:2: robots: unknown key; known here: audit, cell, fit, plate, realtime, robot, scan, scanner, "
+        "cell.toml:2: robots: unknown key; known here: audit, cell, fit, plate, realtime, robot, scan, "
+        "scanner, "
         "schema, "
         "start, tracking");
   CHECK(refusal("[scanner.mount]\nx = 1\n") ==

@@ -94,6 +94,17 @@ TEST_CASE("a run of the second make that was stopped goes on with its stored sho
   check_truth(resumed.summary);
 }
 
+TEST_CASE("a make with one encoding of its frames has no key for it") {
+  firmware_like::add_scanner_make({"triplet", &triplet::codec, largest_frame, driver});
+  const auto plain = firmware_like::parse_config("[scanner]\ndriver = \"triplet\"\n", "cell.toml");
+  REQUIRE(plain.has_value());
+  CHECK(plain->scanner.encoding.empty());
+  const auto chosen =
+      firmware_like::parse_config("[scanner]\ndriver = \"triplet\"\nencoding = \"float32\"\n", "cell.toml");
+  REQUIRE_FALSE(chosen.has_value());
+  CHECK(chosen.error().what.starts_with("cell.toml:3: [scanner] encoding: unknown key; known here: "));
+}
+
 TEST_CASE("a run whose make is not known to the program is refused by its name") {
   const hal::TemporaryFolder folder;
   {
