@@ -149,18 +149,18 @@ std::expected<Measured, Failure> measure(LatencyLoad& load, RunFolder& folder, c
 }
 
 Json busy_json(const LatencyLoad& load) {
-  return {{"surfaces_solved", load.surfaces()},
-          {"points_seen", load.points_seen()},
-          {"frames_recorded", load.frames()},
-          {"frames_refused", load.frames_refused()},
-          {"records_lost", load.recorder().lost()}};
+  return {{"surfaces_solved", load.surfaces()},      {"points_seen", load.points_seen()},
+          {"frames_recorded", load.frames()},        {"frames_refused", load.frames_refused()},
+          {"frames_damaged", load.frames_damaged()}, {"records_lost", load.recorder().lost()}};
 }
 
 std::string busy_line(const Json& busy) {
   return fmt::format(
-      "busy with           {} surfaces solved, {} points looked at, {} frames recorded, {} refused\n",
+      "busy with           {} surfaces solved, {} points looked at, {} frames recorded, {} refused, {} "
+      "damaged\n",
       busy["surfaces_solved"].get<std::uint64_t>(), busy["points_seen"].get<std::uint64_t>(),
-      busy["frames_recorded"].get<std::uint64_t>(), busy["frames_refused"].get<std::uint64_t>());
+      busy["frames_recorded"].get<std::uint64_t>(), busy["frames_refused"].get<std::uint64_t>(),
+      busy["frames_damaged"].get<std::uint64_t>());
 }
 
 std::expected<CellConfig, Failure> config_of(const LatencyOptions& options) {
@@ -249,7 +249,7 @@ int measure_latency(const LatencyOptions& options) {
   if (!config) return complain_all(config.error().what, "moldloft latency");
   auto place = Workplace::make(options.out);
   if (!place) return refuse(place.error().what);
-  auto folder = create_run(place->path(), config->text, RunKind::measured);
+  auto folder = create_run(place->path(), config->text, load_frames, RunKind::measured);
   if (!folder) return refuse(folder.error().what);
   const bool compare = !options.compare.empty();
   if (!options.json)

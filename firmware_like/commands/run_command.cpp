@@ -1,5 +1,6 @@
 #include "firmware_like/commands/run_command.hpp"
 
+#include "firmware_like/config/device_makes.hpp"
 #include "firmware_like/config/plate_name.hpp"
 #include "firmware_like/controller/cell_claim.hpp"
 #include "firmware_like/controller/control_loop.hpp"
@@ -265,7 +266,8 @@ int run_cell(const RunOptions& options) {
     operator_socket.emplace(std::move(*opened));
   }
   auto folder = resume ? resume_run(options.out, config->text, *names)
-                       : create_run(options.out, config->text, RunKind::measured, *names);
+                       : create_run(options.out, config->text, *make_of(config->scanner).codec,
+                                    RunKind::measured, *names);
   if (!folder) return complain(folder.error().what);
 
   hal::SteadyClock clock;

@@ -103,7 +103,8 @@ bool holds_complete_run(const fs::path& path) {
 }
 
 std::expected<RunFolder, Failure> create_run(const fs::path& asked, const std::string& config_text,
-                                             RunKind kind, const RunNames& names) {
+                                             const hal::FrameCodec& codec, RunKind kind,
+                                             const RunNames& names) {
   std::error_code failed;
   fs::path path = asked;
   bool made_folder = true;
@@ -142,9 +143,7 @@ std::expected<RunFolder, Failure> create_run(const fs::path& asked, const std::s
   const RunNames kept{names.plate.empty() ? name_of_folder(path) : names.plate, names.remark};
   about.emplace_back("plate", kept.plate);
   if (!kept.remark.empty()) about.emplace_back("remark", kept.remark);
-  const auto config = parse_config(config_text, "the run's configuration");
-  const ScannerConfig scanner = config ? config->scanner : ScannerConfig{};
-  about.emplace_back(frame_codec_key, make_of(scanner).codec->name);
+  about.emplace_back(frame_codec_key, codec.name);
   // A simulated run happens at no time: its seed brings it back, byte for byte.
   if (kind == RunKind::measured) about.emplace_back("begun", now_utc());
   for (const auto& [key, value] : about) {

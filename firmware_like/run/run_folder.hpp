@@ -9,6 +9,7 @@
 #include "firmware_like/run/shot_files.hpp"
 #include "hal/links/claim.hpp"
 #include "hal/record/run_store.hpp"
+#include "hal/scanner/frame_codec.hpp"
 
 #include <expected>
 #include <filesystem>
@@ -55,8 +56,9 @@ struct RunFolder {
 enum class RunKind { measured, simulated };
 
 // An empty path stands for a new folder under out/, named by the time.
+// The store keeps the codec's name; who reads the run's frames later finds the codec by it.
 std::expected<RunFolder, Failure> create_run(const std::filesystem::path&, const std::string& config_text,
-                                             RunKind, const RunNames& = {});
+                                             const hal::FrameCodec&, RunKind, const RunNames& = {});
 // Goes on under the name that the run has: another one is refused. A remark is added to the one that is there.
 std::expected<RunFolder, Failure> resume_run(const std::filesystem::path&, const std::string& config_text,
                                              const RunNames& = {});

@@ -16,6 +16,7 @@
 #include "hal/record/flight_recorder.hpp"
 #include "hal/record/recorder.hpp"
 #include "hal/record/tapped_link.hpp"
+#include "hal/scanner/psc1.hpp"
 #include "tasks/scheduler/scheduler.hpp"
 #include "tasks/slices/surface_task.hpp"
 
@@ -23,6 +24,9 @@
 #include <vector>
 
 namespace moldloft::firmware_like {
+
+// How its frames lie in the store, whatever make the configuration names.
+inline const hal::FrameCodec& load_frames = hal::psc1::frame_codec;
 
 // The bytes of one frame, over and over, as fast as a link brings them.
 class FrameWire final : public hal::ByteLink {

@@ -1,5 +1,6 @@
 #include "host_sim/runs/day.hpp"
 
+#include "firmware_like/config/device_makes.hpp"
 #include "firmware_like/controller/controller.hpp"
 #include "firmware_like/controller/result_of.hpp"
 #include "firmware_like/process/console.hpp"
@@ -92,7 +93,8 @@ class DayRun {
   std::expected<void, SimError> one_plate() {
     const hal::Instant begun = clock_.now();
     const fs::path folder = scratch_.path / fmt::format("plate-{}", plates_ + 1);
-    auto run = firmware_like::create_run(folder, config_.text, firmware_like::RunKind::simulated);
+    auto run = firmware_like::create_run(folder, config_.text, *firmware_like::make_of(config_.scanner).codec,
+                                         firmware_like::RunKind::simulated);
     if (!run) return std::unexpected{SimError{run.error().what}};
     if (plates_ > 0) controller_->cell().command(tasks::CellEvent::start);
     tick();

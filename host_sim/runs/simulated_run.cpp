@@ -1,5 +1,6 @@
 #include "host_sim/runs/simulated_run.hpp"
 
+#include "firmware_like/config/device_makes.hpp"
 #include "firmware_like/config/plate_name.hpp"
 #include "firmware_like/controller/result_of.hpp"
 #include "firmware_like/report/result_files.hpp"
@@ -74,12 +75,13 @@ std::string shape_and_seed(const CellDescription& cell) {
   return fmt::format("{}, seed {}", mesh ? firmware_like::name_of_folder(cell.plate) : cell.plate, cell.seed);
 }
 
-std::expected<firmware_like::RunFolder, firmware_like::Failure> folder_for(const SimulatedRunOptions& options,
-                                                                           const std::string& text) {
+std::expected<firmware_like::RunFolder, firmware_like::Failure> folder_for(
+    const SimulatedRunOptions& options, const firmware_like::CellConfig& config) {
   firmware_like::RunNames names{options.name, options.remark};
-  if (options.resume) return firmware_like::resume_run(options.out, text, names);
+  if (options.resume) return firmware_like::resume_run(options.out, config.text, names);
   if (names.plate.empty()) names.plate = shape_and_seed(options.cell);
-  return firmware_like::create_run(options.out, text, firmware_like::RunKind::simulated, names);
+  return firmware_like::create_run(options.out, config.text, *firmware_like::make_of(config.scanner).codec,
+                                   firmware_like::RunKind::simulated, names);
 }
 
 }  // namespace
@@ -91,7 +93,7 @@ std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& option
   const std::string text = options.config.empty() ? cell_toml(options.cell, *plate) : options.config;
   const auto config = firmware_like::parse_config(text, "simulated cell");
   if (!config) return std::unexpected{SimError{config.error().what}};
-  auto folder = folder_for(options, text);
+  auto folder = folder_for(options, *config);
   if (!folder) return std::unexpected{SimError{folder.error().what}};
 
   WorldClock clock;

@@ -6,6 +6,7 @@
 #include "firmware_like/controller/controller.hpp"
 #include "firmware_like/run/run_folder.hpp"
 #include "hal/links/cable.hpp"
+#include "hal/scanner/psc1.hpp"
 #include "hal/temporary_folder.hpp"
 #include "host_sim/cell/cell_config.hpp"
 #include "host_sim/cell/world.hpp"
@@ -45,9 +46,10 @@ struct Cell {
   explicit Cell(const CellDescription& d = {}, const std::string& folder_of_a_run = {}) : description{d} {
     const auto plate = *placed_plate(description);
     const std::string text = cell_toml(description, plate);
-    auto folder = folder_of_a_run.empty() ? firmware_like::create_run(own_folder.file("run"), text,
-                                                                      firmware_like::RunKind::simulated)
-                                          : firmware_like::resume_run(folder_of_a_run, text);
+    auto folder = folder_of_a_run.empty()
+                      ? firmware_like::create_run(own_folder.file("run"), text, hal::psc1::frame_codec,
+                                                  firmware_like::RunKind::simulated)
+                      : firmware_like::resume_run(folder_of_a_run, text);
     REQUIRE(folder.has_value());
     run = std::move(*folder);
     world =

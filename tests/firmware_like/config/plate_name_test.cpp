@@ -3,6 +3,7 @@
 #include "firmware_like/process/build_info.hpp"
 #include "firmware_like/results/summary.hpp"
 #include "firmware_like/run/run_folder.hpp"
+#include "hal/scanner/psc1.hpp"
 #include "hal/temporary_folder.hpp"
 
 #include <doctest/doctest.h>
@@ -71,7 +72,8 @@ TEST_CASE("a run's store keeps the plate's name, the remark and the program that
   const hal::TemporaryFolder folder;
   const std::string path = folder.file("plate-3");
   {
-    auto run = create_run(path, "", RunKind::measured, {"port side 3", "after the second pass"});
+    auto run = create_run(path, "", hal::psc1::frame_codec, RunKind::measured,
+                          {"port side 3", "after the second pass"});
     REQUIRE(run.has_value());
     CHECK(run->names.plate == "port side 3");
     CHECK(run->store->meta("plate").value_or("") == "port side 3");

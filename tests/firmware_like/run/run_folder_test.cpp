@@ -1,6 +1,7 @@
 #include "firmware_like/run/run_folder.hpp"
 
 #include "firmware_like/forked.hpp"
+#include "hal/scanner/psc1.hpp"
 #include "hal/temporary_folder.hpp"
 
 #include <doctest/doctest.h>
@@ -26,7 +27,7 @@ TEST_CASE("a run's folder is made with all folders above it, and holds the confi
   const hal::TemporaryFolder folder;
   const fs::path path = folder.path() / "a" / "b";
   {
-    const auto run = create_run(path, config, RunKind::measured);
+    const auto run = create_run(path, config, hal::psc1::frame_codec, RunKind::measured);
     REQUIRE_MESSAGE(run.has_value(), run.error().what);
     CHECK(run->made_folder);
     CHECK(run->archive == nullptr);
@@ -43,15 +44,15 @@ TEST_CASE("a run's folder is made with all folders above it, and holds the confi
 TEST_CASE("a folder that cannot be made is refused with its path and the reason") {
   const hal::TemporaryFolder folder;
   std::ofstream{folder.file("file")} << "here\n";
-  CHECK(refused(create_run(folder.file("file"), config, RunKind::measured)) ==
+  CHECK(refused(create_run(folder.file("file"), config, hal::psc1::frame_codec, RunKind::measured)) ==
         folder.file("file") + ": cannot be created (Not a directory); give another --out");
-  CHECK(refused(create_run(folder.file("file/run"), config, RunKind::measured)) ==
+  CHECK(refused(create_run(folder.file("file/run"), config, hal::psc1::frame_codec, RunKind::measured)) ==
         folder.file("file/run") + ": cannot be created (Not a directory); give another --out");
 }
 
 TEST_CASE("a folder that cannot be written is refused before anything moves") {
-  const auto run =
-      create_run("/proc/self", config, RunKind::measured);  // is there, and takes no file from anybody
+  const auto run = create_run("/proc/self", config, hal::psc1::frame_codec,
+                              RunKind::measured);  // is there, and takes no file from anybody
   REQUIRE_FALSE(run.has_value());
   CHECK(run.error().what.starts_with("/proc/self/run.db: cannot be written"));
 }
@@ -59,10 +60,10 @@ TEST_CASE("a folder that cannot be written is refused before anything moves") {
 TEST_CASE("a measured run is never overwritten, neither by a measured nor by a simulated one") {
   const hal::TemporaryFolder folder;
   const std::string path = folder.file("run");
-  REQUIRE(create_run(path, config, RunKind::measured).has_value());
-  CHECK(refused(create_run(path, config, RunKind::measured)) ==
+  REQUIRE(create_run(path, config, hal::psc1::frame_codec, RunKind::measured).has_value());
+  CHECK(refused(create_run(path, config, hal::psc1::frame_codec, RunKind::measured)) ==
         path + ": holds a run already; give another --out, or --resume to go on with it");
-  CHECK(refused(create_run(path, config, RunKind::simulated)) ==
+  CHECK(refused(create_run(path, config, hal::psc1::frame_codec, RunKind::simulated)) ==
         path + ": holds a run already; give another --out");
   CHECK(open_run(path).has_value());
 }
@@ -70,9 +71,9 @@ TEST_CASE("a measured run is never overwritten, neither by a measured nor by a s
 TEST_CASE("a simulated run, which its seed brings back, makes room for another simulated run only") {
   const hal::TemporaryFolder folder;
   const std::string path = folder.file("run");
-  REQUIRE(create_run(path, config, RunKind::simulated).has_value());
-  CHECK_FALSE(create_run(path, config, RunKind::measured).has_value());
-  const auto again = create_run(path, "[start]\nyaw_deg = 4\n", RunKind::simulated);
+  REQUIRE(create_run(path, config, hal::psc1::frame_codec, RunKind::simulated).has_value());
+  CHECK_FALSE(create_run(path, config, hal::psc1::frame_codec, RunKind::measured).has_value());
+  const auto again = create_run(path, "[start]\nyaw_deg = 4\n", hal::psc1::frame_codec, RunKind::simulated);
   REQUIRE(again.has_value());
   CHECK_FALSE(again->made_folder);
   CHECK_FALSE(again->store->meta("begun").has_value());  // it happens at no time
@@ -84,7 +85,7 @@ TEST_CASE(
     "today") {
   const hal::TemporaryFolder folder;
   const std::string path = folder.file("run");
-  REQUIRE(create_run(path, config, RunKind::measured).has_value());
+  REQUIRE(create_run(path, config, hal::psc1::frame_codec, RunKind::measured).has_value());
   CHECK(resume_run(path, config).has_value());
   CHECK(resume_run(path, config + "[scanner]\nport = 9\n").has_value());
   CHECK(refused(resume_run(path, "[start]\nyaw_deg = 4\n")) ==
@@ -96,7 +97,7 @@ TEST_CASE(
 TEST_CASE("a run is resumed with a larger memory plan, and fitted with it from then on") {
   const hal::TemporaryFolder folder;
   const std::string path = folder.file("run"), larger = config + "[plate]\nlargest_mm = [900, 900]\n";
-  REQUIRE(create_run(path, config, RunKind::measured).has_value());
+  REQUIRE(create_run(path, config, hal::psc1::frame_codec, RunKind::measured).has_value());
   REQUIRE(resume_run(path, larger).has_value());
   CHECK(*open_run(path)->store->meta("config") == larger);
 }
@@ -104,7 +105,7 @@ TEST_CASE("a run is resumed with a larger memory plan, and fitted with it from t
 TEST_CASE("what is resumed is appended to, what is opened to be read is not") {
   const hal::TemporaryFolder folder;
   const std::string path = folder.file("run");
-  REQUIRE(create_run(path, config, RunKind::measured).has_value());
+  REQUIRE(create_run(path, config, hal::psc1::frame_codec, RunKind::measured).has_value());
   {
     const auto resumed = resume_run(path, config);
     REQUIRE(resumed.has_value());
@@ -130,20 +131,20 @@ TEST_CASE(
 
 TEST_CASE("a discarded run leaves no trace, and what else lies in the folder stays") {
   const hal::TemporaryFolder folder;
-  auto own = create_run(folder.file("own"), config, RunKind::measured);
+  auto own = create_run(folder.file("own"), config, hal::psc1::frame_codec, RunKind::measured);
   REQUIRE(own.has_value());
   discard_run(std::move(*own));
   CHECK_FALSE(fs::exists(folder.file("own")));
 
   fs::create_directories(folder.file("mine"));
-  auto empty = create_run(folder.file("mine"), config, RunKind::measured);
+  auto empty = create_run(folder.file("mine"), config, hal::psc1::frame_codec, RunKind::measured);
   REQUIRE(empty.has_value());
   discard_run(std::move(*empty));
   CHECK(fs::is_directory(folder.file("mine")));  // was there before
   CHECK(fs::is_empty(folder.file("mine")));
 
   std::ofstream{folder.file("mine/notes.txt")} << "keep\n";
-  auto beside = create_run(folder.file("mine"), config, RunKind::measured);
+  auto beside = create_run(folder.file("mine"), config, hal::psc1::frame_codec, RunKind::measured);
   REQUIRE(beside.has_value());
   discard_run(std::move(*beside));
   CHECK(fs::exists(folder.file("mine/notes.txt")));
@@ -156,12 +157,12 @@ TEST_CASE("runs begun in one second get a folder each, named by date and time") 
   fs::current_path(folder.file(""));
   std::set<fs::path> made;
   for (int i = 0; i < 5; ++i) {
-    const auto run = create_run({}, config, RunKind::measured);
+    const auto run = create_run({}, config, hal::psc1::frame_codec, RunKind::measured);
     REQUIRE(run.has_value());
     CHECK(std::regex_match(run->path.string(), std::regex{R"(out/run-\d{8}-\d{6}(-\d)?)"}));
     made.insert(run->path);
   }
-  auto refused_one = create_run({}, config, RunKind::measured);
+  auto refused_one = create_run({}, config, hal::psc1::frame_codec, RunKind::measured);
   REQUIRE(refused_one.has_value());
   const fs::path gone = refused_one->path;
   discard_run(std::move(*refused_one));
@@ -174,13 +175,13 @@ TEST_CASE("a folder that is written to is refused to everybody else, and free ag
   const hal::TemporaryFolder folder;
   const std::string path = folder.file("run");
   {
-    const auto first = create_run(path, config, RunKind::measured);
+    const auto first = create_run(path, config, hal::psc1::frame_codec, RunKind::measured);
     REQUIRE(first.has_value());
     const std::string link = folder.file("link");
     fs::create_directory_symlink(path, link);
     const std::string words = " is in use by process " + std::to_string(::getpid()) +
                               ": one controller at a time; wait for its end, or stop it";
-    CHECK(refused(create_run(path, config, RunKind::measured)) == path + words);
+    CHECK(refused(create_run(path, config, hal::psc1::frame_codec, RunKind::measured)) == path + words);
     CHECK(refused(resume_run(link, config)) == link + words);
     CHECK(open_run(path).has_value());  // reading is free
   }
@@ -190,7 +191,7 @@ TEST_CASE("a folder that is written to is refused to everybody else, and free ag
 TEST_CASE("results whose run is elsewhere are not written over by a new run") {
   const hal::TemporaryFolder folder;
   std::ofstream{folder.file("summary.json")} << "{}\n";
-  CHECK(refused(create_run(folder.file(""), config, RunKind::measured)) ==
+  CHECK(refused(create_run(folder.file(""), config, hal::psc1::frame_codec, RunKind::measured)) ==
         folder.file("") + ": holds results whose run is not there; give another --out");
   CHECK_FALSE(fs::exists(folder.file("run.db")));
 }
@@ -198,7 +199,7 @@ TEST_CASE("results whose run is elsewhere are not written over by a new run") {
 TEST_CASE("a run whose folder is removed while it is open is brought back whole") {
   const hal::TemporaryFolder folder;
   const std::string path = folder.file("run");
-  const auto run = create_run(path, config, RunKind::measured);
+  const auto run = create_run(path, config, hal::psc1::frame_codec, RunKind::measured);
   REQUIRE(run.has_value());
   CHECK(*bring_back(*run) == false);
   REQUIRE(run->store->set_meta("late", "word").has_value());
@@ -214,7 +215,7 @@ TEST_CASE("a crashed run is read whole from a folder that cannot be written, or 
   const hal::TemporaryFolder folder;
   const fs::path crashed = folder.file("crashed");
   test::in_child({}, [&] {
-    auto run = create_run(crashed, config, RunKind::measured);
+    auto run = create_run(crashed, config, hal::psc1::frame_codec, RunKind::measured);
     if (run) (void)run->store->set_meta("last", "word");
     ::_exit(0);  // as a kill leaves it: the last words stand in the log alone
     return std::string{};
