@@ -95,6 +95,7 @@ std::string status_json(const tasks::CellProgress& p) {
            {"boundary_shots", p.boundary_shots},
            {"surface_shots", p.surface_shots},
            {"surface_planned", p.surface_planned},
+           {"part_done", p.part_done},
            {"retaken", p.retaken},
            {"waiting", awaited_text(p, {.has_operator = true})},
            {"seconds", std::chrono::duration<double>(p.now).count()},

@@ -56,8 +56,6 @@ class LineRobot final : public Robot {
   LossCounts losses() const override;
   std::size_t plan_bytes() const override { return sizeof *this + session_.plan_bytes(); }
 
-  robot_line::Status last_status() const { return status_; }
-
  private:
   static constexpr std::size_t shown_of_line =
       40;  // of a line in a message: verb and fields, with room for the reason

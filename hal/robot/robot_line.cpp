@@ -230,7 +230,6 @@ void read_answer(Words& words, Reply& reply) {
       break;
     case Verb::pos:
       reply.pose = words.pose();
-      reply.has_pose = true;
       break;
     default:
       break;
@@ -373,7 +372,6 @@ std::expected<Reply, Flaw> parse_reply(std::string_view line) noexcept {
   }
   if (*verb == Verb::don) {
     reply.pose = words.pose();
-    reply.has_pose = true;
   }
   if (*verb == Verb::err || *verb == Verb::evt) {
     reply.code = static_cast<int>(words.integer(-largest_code, largest_code));

@@ -80,8 +80,7 @@ enum class Error : int {
 struct Reply {  // a robot line
   int number = 0;
   Verb verb = Verb::ack;
-  Pose pose{};  // DON, and the answer to POS
-  bool has_pose = false;
+  Pose pose{};               // DON, and the answer to POS
   Verb answers = Verb::ack;  // for 0000 lines: which question is answered (syn, png, sta, pos, stp)
   Status status{};           // STA
   std::uint32_t nonce = 0;   // SYN

@@ -67,7 +67,6 @@ class PscScanner final : public Scanner {
   std::string_view why() const override { return why_; }
   LossCounts losses() const override;
 
-  int attempts() const { return shot_.attempts; }  // TRIGGERs sent for the last shot
   std::size_t plan_bytes() const override;
 
  private:

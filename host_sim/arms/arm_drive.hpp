@@ -33,7 +33,6 @@ class ArmDrive {
   void stop(hal::Instant now);  // brakes at once
 
   bool moving(hal::Instant now) const noexcept { return now < stands_at_; }  // the joints turn
-  bool settled(hal::Instant now) const noexcept { return now >= settled_at(); }
   hal::Instant stands_at() const noexcept { return stands_at_; }
   hal::Instant settled_at() const noexcept { return stands_at_ + settling_; }
 

@@ -116,7 +116,6 @@ void RobotServer::answer_question(const robot_line::Command& question, hal::Inst
       break;
     case Verb::pos:
       reply.pose = drive_.reported_pose(now);
-      reply.has_pose = true;
       break;
     case Verb::stp:
       abort_work(Error::stopped, now);
@@ -231,7 +230,6 @@ void RobotServer::send_fate() {
     case Fate::done:
       reply.verb = Verb::don;
       reply.pose = fate_pose_;
-      reply.has_pose = true;
       break;
     case Fate::failed:
       reply.verb = Verb::err;

@@ -80,7 +80,6 @@ class Cell final : public Task, public CellPort, private CellActions {
     return shots_.scanner_clock();
   }  // since the scanner's last start
   const RunEvidence& evidence() const { return measurement_.evidence(); }
-  std::size_t view_bytes() const { return measurement_.view_bytes(); }
   std::size_t plan_bytes() const { return measurement_.plan_bytes(); }
 
  private:

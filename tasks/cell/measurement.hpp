@@ -75,7 +75,6 @@ class Measurement final : public ShotUser {
   const RunEvidence& evidence() const { return evidence_.evidence(); }
   std::uint64_t points_seen() const { return points_seen_; }
   hal::Instant surface_ready() const { return surface_ready_; }
-  std::size_t view_bytes() const { return view_.bytes(); }
   std::size_t plan_bytes() const;
 
  private:

@@ -116,7 +116,6 @@ class BoundaryTracker {
   Eigen::Vector3d plate_hint() const { return hint_; }
   std::span<const Eigen::Vector2d> edge_points() const { return edges_; }
   std::span<const Eigen::Vector2d> corners() const { return corners_; }  // counter-clockwise, merged
-  const Eigen::Vector2d& start_anchor() const { return anchor_; }
   std::size_t bytes() const;
 
  private:

@@ -73,7 +73,6 @@ class SurfaceTask final : public BackgroundTask {
   // Keeps a thinned copy of the plate's points of a boundary shot; `shot` and its frame stay untouched by others until
   // the lease ends. Goes before the work on the outline.
   void keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner, FrameLease) MOLDLOFT_NONBLOCKING;
-  bool keeping() const MOLDLOFT_NONBLOCKING { return keeping_from_ != nullptr; }
   // `corner_candidates`: what the tracker took for corners; more than four is no harm.
   void build_outline(std::span<const Eigen::Vector2d> edges,
                      std::span<const Eigen::Vector2d> corner_candidates) MOLDLOFT_NONBLOCKING;
@@ -111,6 +110,7 @@ class SurfaceTask final : public BackgroundTask {
   // quarter of it.
   static constexpr std::size_t chunk_points = 88, kept_points = 320;
 
+  bool keeping() const MOLDLOFT_NONBLOCKING { return keeping_from_ != nullptr; }
   bool can_look() const MOLDLOFT_NONBLOCKING { return looking() && !looking_at_->waits(); }
   void fail(geometry::Error error);
   void step_keep() MOLDLOFT_NONBLOCKING;

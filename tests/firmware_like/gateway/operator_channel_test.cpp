@@ -100,6 +100,18 @@ TEST_CASE("status is one line of JSON with the reason of a hold") {
   CHECK(bench.looks == 0);
 }
 
+TEST_CASE("status says how much of a phase is done, and how long the run still takes") {
+  const auto status = nlohmann::json::parse(status_json({.state = CellState::execute,
+                                                         .surface_shots = 4,
+                                                         .surface_planned = 16,
+                                                         .part_done = 0.25,
+                                                         .time_left = 9s,
+                                                         .left_is_planned = true}));
+  CHECK(status["part_done"] == 0.25);
+  CHECK(status["seconds_left"] == 9);
+  CHECK(status["left_is_estimate"] == false);
+}
+
 TEST_CASE("over the socket a word comes in and the answer goes back, until the socket is gone") {
   const hal::TemporaryFolder folder;
   const std::string path = folder.file("control");

@@ -25,8 +25,8 @@ int boundary_shots(const SimulatedCell& cell) {
 
 // The robot's next DON says something else than it should: the line is sent by the robot's end before the true one.
 void report_elsewhere(const SimulatedCell& cell, int number, const hal::Pose& pose) {
-  const auto line = hal::robot_line::format(hal::robot_line::Reply{
-      .number = number, .verb = hal::robot_line::Verb::don, .pose = pose, .has_pose = true});
+  const auto line = hal::robot_line::format(
+      hal::robot_line::Reply{.number = number, .verb = hal::robot_line::Verb::don, .pose = pose});
   REQUIRE_FALSE(line.empty());
   cell.robot_cable.device().write(std::as_bytes(std::span{line.view()}));
 }
