@@ -103,7 +103,9 @@ struct RunResult {
   CycleShares cycle;
   MemoryPlan memory;
   std::uint64_t recorder_lost = 0;
-  Json timing;                // timing_report.hpp
+  // As timing.json holds it (timing_report.hpp). Its readers only show it, and runs of other versions lack keys, so a
+  // value of its own type would hold nothing that they need.
+  Json timing;
   Json truth;                 // of a simulated run: the judge's figures; null where there are none
   std::string fitted_from{};  // the run whose shots were fitted once more
 };
