@@ -13,6 +13,7 @@
 #include "host_sim/runs/campaign.hpp"
 #include "host_sim/runs/day.hpp"
 #include "host_sim/runs/device_host.hpp"
+#include "host_sim/runs/hard_campaign.hpp"
 #include "host_sim/runs/judge.hpp"
 #include "host_sim/runs/simulated_run.hpp"
 
@@ -89,6 +90,7 @@ int cell_command(SimulatedRunOptions& options, bool quiet) {
 void add_cell_command(CLI::App& app, SimulatedRunOptions& options, bool& quiet) {
   auto* command = app.add_subcommand("cell", "the whole cell in one thread: controller, cables and devices");
   add_cell_options(*command, options.cell);
+  add_fault_option(*command, options.cell);
   command->add_option("--out", options.out, "the run's folder; default: a new one under out/");
   const auto add_text = [&](const char* option, std::string& text, std::size_t longest, const char* about) {
     command->add_option_function<std::string>(
@@ -112,9 +114,9 @@ void add_cell_command(CLI::App& app, SimulatedRunOptions& options, bool& quiet) 
       ->check(CLI::IsMember({"virtual", "real"}));
 }
 
-CLI::Validator all_or_one_of(std::span<const std::string_view> names) {
-  const auto check = [names](const std::string& word) {
-    if (word == "all" || std::ranges::find(names, word) != names.end()) return std::string{};
+CLI::Validator all_or_one_of(std::span<const std::string_view> names, std::string_view also = "all") {
+  const auto check = [names, also](const std::string& word) {
+    if (word == "all" || word == also || std::ranges::find(names, word) != names.end()) return std::string{};
     return fmt::format("'{}' given; all, or one of {} is wanted", word, fmt::join(names, ", "));
   };
   return {check, ""};
@@ -122,9 +124,11 @@ CLI::Validator all_or_one_of(std::span<const std::string_view> names) {
 
 void add_campaign_command(CLI::App& app, CampaignOptions& options) {
   auto* command = app.add_subcommand("campaign", "many simulated runs: shapes x outlines x seeds");
-  command->add_option("--plates", options.plates, "all, or one shape")
+  command
+      ->add_option("--plates", options.plates,
+                   "all, one shape, or hard: whatever goes wrong, and a judge of honesty")
       ->capture_default_str()
-      ->check(all_or_one_of(shape_names()));
+      ->check(all_or_one_of(shape_names(), hard_plates));
   command->add_option("--outlines", options.outlines, "all, or one outline")
       ->capture_default_str()
       ->check(all_or_one_of(outline_names()));
@@ -133,7 +137,8 @@ void add_campaign_command(CLI::App& app, CampaignOptions& options) {
     if (!seeds) throw CLI::ValidationError("--seeds", seeds.error().what);
     options.seeds = *seeds;
   };
-  command->add_option_function<std::string>("--seeds", read_seeds, "A..B or A")->default_str("1..3");
+  command->add_option_function<std::string>("--seeds", read_seeds, "A..B or A; of hard 1..400")
+      ->default_str("1..3");
   command->add_option("--out", options.out, "keep the run folders here");
   command->add_flag("--json", options.json, "an array of objects instead of the table");
 }
@@ -163,6 +168,7 @@ int run_command_line(int argc, char** argv) {
   auto* devices_command =
       app.add_subcommand("devices", "serve scanner and robot in real time until interrupted");
   add_cell_options(*devices_command, devices.cell);
+  add_fault_option(*devices_command, devices.cell);
   add_number_with_default(*devices_command, "--scanner-port", devices.scanner_port, {0, 65535},
                           "loopback TCP port, 0 for any");
   auto* pty = devices_command->add_option("--robot-pty", devices.robot_pty, "name for the robot's terminal")

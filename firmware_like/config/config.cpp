@@ -90,6 +90,7 @@ void read_robot(TomlSection s, RobotConfig& c) {
   read_range(w, "y_mm", c.workspace.y_mm);
   read_range(w, "z_mm", c.workspace.z_mm);
   read_range(w, "reach_mm", c.workspace.reach_mm);
+  w.number("parked_mm", c.workspace.parked_mm, 0, 1e5);
   w.number("max_step_mm", c.workspace.max_step_mm, 1, 1e5);
   w.integer("max_speed_percent", c.workspace.max_speed_percent, 1, 100);
   w.finish();
@@ -294,7 +295,7 @@ std::string first_difference(const std::string& text, const std::string& other) 
   for (auto* keys : {&a, &b}) {
     for (const char* no_matter :
          {"cell.name", "cell.device_timeout_s", "cell.scanner_wait_s", "cell.disk_wait_s", "robot.arrival_mm",
-          "robot.arrival_deg", "plate.largest_mm", "audit.unseen_percent"}) {
+          "robot.arrival_deg", "robot.workspace.parked_mm", "plate.largest_mm", "audit.unseen_percent"}) {
       keys->erase(no_matter);
     }
     for (const char* section : {"scanner", "robot"})

@@ -177,7 +177,7 @@ void LineRobot::carry_out(LineAction action, Instant now) {
     case LineAction::await_done:
       return await_done();
     case LineAction::report_done:
-      return report_done();
+      return report_done(now);
     case LineAction::report_refused:
       return report_refused();
     case LineAction::report_stopped_and_sync:
@@ -238,6 +238,7 @@ void LineRobot::ask_pose(Instant now) {
 void LineRobot::announce() {
   session_.greeted();
   announced_ = true;
+  stand_asked_ = moved_once_ = false;
   why_ = "";
   events_.push({.kind = RobotEvent::Kind::ready,
                 .pose = pose_,
@@ -247,7 +248,9 @@ void LineRobot::announce() {
 }
 
 void LineRobot::send_command(Instant now) {
-  resends_ = 0;
+  resends_ = unfit_answers_ = 0;
+  stand_due_ = never;
+  stand_asked_ = moved_once_ = false;
   answer_due_ = now + answer_time_;
   done_due_ = now + settings_.done_timeout;
   send(command_, now);
@@ -267,7 +270,8 @@ void LineRobot::report_moving() {
 
 void LineRobot::await_done() { answer_due_ = never; }
 
-void LineRobot::report_done() {
+void LineRobot::report_done(Instant now) {
+  stand_due_ = now + settings_.stand_check;
   events_.push({.kind = RobotEvent::Kind::done, .pose = pose_, .calibrated = true, .text = {}});
 }
 
@@ -356,6 +360,9 @@ void LineRobot::garbled(std::string_view line, Flaw flaw, Instant now) {
   // SYN was answered, so the line is good: what comes now is of another form than it should have.
   if (phase_ == Phase::checking || phase_ == Phase::locating) why_ = *instead_of_lines();
   answer_due_ = std::min(answer_due_, now + settings_.garble_pause);
+  // Noise does not bring the right checksum time and again: the robot's program writes numbers that no field holds.
+  if (flaw == Flaw::fields && has_command() && ++unfit_answers_ > settings_.resends)
+    fault(now, 0, *instead_of_lines());
 }
 
 // What has come since the last line that could be read.
@@ -384,9 +391,7 @@ void LineRobot::on_answer(const Reply& reply, Instant now) {
       on_status(reply.status, now);
       break;
     case Verb::pos:
-      if (phase_ != Phase::locating) break;
-      pose_ = reply.pose;
-      cue(Cue::located, now);
+      on_pose(reply.pose, now);
       break;
     case Verb::stp:
       stop_wanted_ = false;
@@ -394,6 +399,23 @@ void LineRobot::on_answer(const Reply& reply, Instant now) {
     default:
       break;
   }
+}
+
+// An arm that stands is believed to have moved when two answers in a row say so: one may be an old line that came twice.
+void LineRobot::on_pose(const Pose& pose, Instant now) {
+  if (phase_ == Phase::locating) {
+    pose_ = pose;
+    return cue(Cue::located, now);
+  }
+  if (phase_ != Phase::ready || !std::exchange(stand_asked_, false)) return;
+  const bool moved = pose != pose_;
+  if (moved && moved_once_) {
+    pose_ = pose;
+    events_.push({.kind = RobotEvent::Kind::stands, .pose = pose_, .calibrated = true, .text = {}});
+  } else if (moved) {
+    stand_due_ = now;
+  }
+  moved_once_ = moved && !moved_once_;
 }
 
 void LineRobot::on_status(const Status& status, Instant now) {
@@ -478,7 +500,21 @@ void LineRobot::watch(Instant now) {
   }
   const bool waits = phase_ != Phase::ready && phase_ != Phase::faulted;
   if (waits && now >= answer_due_) cue(Cue::late, now);
-  if (session_.heartbeat_due(now)) ask(has_command() ? Verb::sta : Verb::png, now);
+  if (phase_ == Phase::ready && now >= stand_due_) ask_where_it_stands(now);
+  if (session_.heartbeat_due(now)) sign_of_life(now);
+}
+
+void LineRobot::ask_where_it_stands(Instant now) {
+  stand_due_ = never;
+  stand_asked_ = ask(Verb::pos, now);
+}
+
+// Questions, where there is something to learn: how the robot is, and where an arm stands that has nothing to do.
+void LineRobot::sign_of_life(Instant now) {
+  if (has_command()) return void(ask(Verb::sta, now));
+  if (phase_ != Phase::ready) return void(ask(Verb::png, now));
+  status_asked_last_ = !status_asked_last_;
+  status_asked_last_ ? void(ask(Verb::sta, now)) : ask_where_it_stands(now);
 }
 
 bool LineRobot::ask(Verb verb, Instant now) { return send(format(Command{.verb = verb}), now); }

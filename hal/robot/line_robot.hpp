@@ -32,6 +32,9 @@ class LineRobot final : public Robot {
     int resends = 3;  // of a line without an answer, before the robot is asked how it stands
     Duration silent_limit = 3s;     // the robot's own watchdog; an arm that heard nothing has stopped by then
     Duration done_timeout = 60s;    // of one command; the longest path at the lowest speed takes less
+    // After DON, before an arm that still has nothing to do is asked where it stands: a robot that said DON too early, or
+    // only says again what it was told, shows by then. Then once a second.
+    Duration stand_check = 50ms;
     Duration garble_pause = 20ms;   // after a garbled reply, before the same line goes again
     Duration connect_timeout = 2s;  // where the line is a terminal server's socket
     Duration first_back_off = 100ms;  // of opening the port again; doubles with each failure
@@ -80,7 +83,7 @@ class LineRobot final : public Robot {
   void resend_command(Instant now) MOLDLOFT_NONBLOCKING;
   void report_moving() MOLDLOFT_NONBLOCKING;
   void await_done() MOLDLOFT_NONBLOCKING;
-  void report_done() MOLDLOFT_NONBLOCKING;
+  void report_done(Instant now) MOLDLOFT_NONBLOCKING;
   void report_refused() MOLDLOFT_NONBLOCKING;
   void report_stopped_and_sync(Instant now) MOLDLOFT_NONBLOCKING;
   void report_fault() MOLDLOFT_NONBLOCKING;
@@ -97,6 +100,9 @@ class LineRobot final : public Robot {
 
   std::optional<Message> instead_of_lines() const;
   void watch(Instant now);
+  void on_pose(const Pose&, Instant now);
+  void ask_where_it_stands(Instant now);
+  void sign_of_life(Instant now);
   bool has_command() const { return phase_ == Phase::commanded || phase_ == Phase::moving; }
   bool begin(robot_line::Command command, Instant now);
   bool ask(robot_line::Verb verb, Instant now);
@@ -119,6 +125,9 @@ class LineRobot final : public Robot {
   Instant answer_due_{0};  // of the line that the phase waits on
   Instant stop_due_{0};
   Instant done_due_{0};
+  Instant stand_due_ = Instant::max();  // of the question where the arm stands
+  bool stand_asked_ = false, moved_once_ = false, status_asked_last_ = false;
+  int unfit_answers_ = 0;  // to the command, with a right checksum and wrong fields
   robot_line::Status status_;
   Pose pose_;     // last reported
   int code_ = 0;  // of the last error or event

@@ -30,9 +30,10 @@ enum class RobotState {
 
 struct RobotEvent {
   enum class Kind {
-    ready,    // synchronised; pose says where the arm stands, calibrated whether it knows that
-    moving,   // the command was checked and motion has started
-    done,     // stopped and settled; pose was read back
+    ready,   // synchronised; pose says where the arm stands, calibrated whether it knows that
+    moving,  // the command was checked and motion has started
+    done,    // stopped and settled; pose was read back
+    stands,  // asked again while it stands, it says another place than before; a driver that cannot ask never says so
     refused,  // ERR: the controller will not do it; code says why
     fault,    // e-stop, power loss, watchdog, error during motion; latched
     lost,     // the link is gone or the robot is silent beyond the limit

@@ -13,7 +13,15 @@
 
 namespace moldloft::host_sim {
 
-enum class Stream : std::uint64_t { placement = 1, optics = 2, arm = 3, sessions = 4, arm_errors = 5 };
+enum class Stream : std::uint64_t {
+  placement = 1,
+  optics = 2,
+  arm = 3,
+  sessions = 4,
+  arm_errors = 5,
+  faults = 6,
+  hard = 7
+};
 
 class Random {
  public:

@@ -26,6 +26,7 @@ Eigen::Vector2d middle_of(const CellDescription& cell) {
 }
 
 std::expected<std::shared_ptr<const Plate>, SimError> plate_of(const CellDescription& cell) {
+  if (cell.made) return cell.made;
   if (is_mesh(cell)) {
     return read_mesh_plate(cell.plate, cell.unit.value_or(LengthUnit::millimetre), cell.thickness_mm);
   }

@@ -16,6 +16,7 @@
 #include "host_sim/arms/scara_arm.hpp"
 #include "host_sim/devices/robot_server.hpp"
 #include "host_sim/devices/scanner_server.hpp"
+#include "host_sim/faults/fault.hpp"
 #include "host_sim/plates/mesh_plate.hpp"
 #include "host_sim/plates/plate_shape.hpp"
 
@@ -37,6 +38,7 @@ struct Placement {
 
 struct CellDescription {
   std::string plate = "saddle";    // a shape's name, or the path of a mesh file
+  std::shared_ptr<const Plate> made;  // a plate that neither describes; `plate` is then only its name
   std::optional<LengthUnit> unit;  // of that file; millimetres unless given
   OutlineKind outline = OutlineKind::square;
   OutlineSizes sizes;
@@ -52,7 +54,9 @@ struct CellDescription {
   MakeScannerDevice make_scanner = make_scanner_server;
   ScannerTimes scanner_times;
   RobotTimes robot_times;
-  geometry::RigidMotion tip_from_scanner = nominal_mount();  // as it truly is
+  geometry::RigidMotion tip_from_scanner = nominal_mount();  // as it truly is, but for faults
+  std::vector<Fault>
+      faults;  // what is wrong on purpose; whoever writes the cell's configuration does not know
 
   std::uint64_t seed = 1;
 };

@@ -69,4 +69,19 @@ void add_cell_options(CLI::App& command, CellDescription& cell) {
   command.parse_complete_callback([&command, &cell] { refuse_contradictions(command, cell); });
 }
 
+void add_fault_option(CLI::App& command, CellDescription& cell) {
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--fault",
+          [&cell](const std::vector<std::string>& texts) {
+            for (const auto& text : texts) {
+              const auto faults = faults_from(text);
+              if (!faults) throw CLI::ValidationError("--fault", faults.error().what);
+              cell.faults.insert(cell.faults.end(), faults->begin(), faults->end());
+            }
+          },
+          "what is wrong on purpose: WHAT [SIZE] [at N | from N], ...")
+      ->allow_extra_args(false);
+}
+
 }  // namespace moldloft::host_sim

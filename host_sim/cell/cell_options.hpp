@@ -9,5 +9,7 @@
 namespace moldloft::host_sim {
 
 void add_cell_options(CLI::App& command, CellDescription& cell);
+// --fault, which may be given several times, for the commands that have devices to be wrong.
+void add_fault_option(CLI::App& command, CellDescription& cell);
 
 }  // namespace moldloft::host_sim

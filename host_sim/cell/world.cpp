@@ -1,6 +1,7 @@
 #include "host_sim/cell/world.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace moldloft::host_sim {
 
@@ -12,21 +13,44 @@ struct Span {
   Span within(const Span& other) const { return {std::max(from, other.from), std::min(to, other.to)}; }
 };
 
+OpticsSettings noisier(OpticsSettings optics, double factor) {
+  optics.noise_mm *= factor;
+  return optics;
+}
+
 }  // namespace
 
 SimulatedWorld::SimulatedWorld(const CellDescription& cell, PlateInstance plate,
                                hal::ByteLink& scanner_device, hal::ByteLink& robot_device)
-    : plate_(std::move(plate)),
-      tip_from_scanner_(cell.tip_from_scanner),
-      robot_(robot_device, ArmDrive(make_arm(cell), cell.drive, cell.seed), cell.robot_times),
+    : has_faults_(!cell.faults.empty()),
+      faults_(cell.faults, cell.seed),
+      put_down_(std::move(plate)),
+      plate_(put_down_),
+      tip_from_scanner_(faults_.mounted(cell.tip_from_scanner)),
+      robot_(robot_device, ArmDrive(make_arm(cell), cell.drive, cell.seed), cell.robot_times,
+             has_faults_ ? this : nullptr),
       exposure_(cell.scanner_times.exposure),
-      scanner_(cell.make_scanner(scanner_device, Optics(cell.optics), *this, cell.scanner_times, cell.seed)) {
+      scanner_(cell.make_scanner(scanner_device, Optics(noisier(cell.optics, faults_.noise_factor())), *this,
+                                 cell.scanner_times, cell.seed)) {
+  look_at_faults(hal::Instant{0});
+}
+
+// Whoever moves a plate or an arm does so between two exposures.
+void SimulatedWorld::look_at_faults(hal::Instant now) {
+  const std::uint64_t exposed = scanner_->counters().exposures;
+  const bool exposes = exposed > 0 && now < scanner_->busy_from() + exposure_;
+  const std::uint64_t shot = exposed + (exposes ? 0 : 1);
+  const bool of_surface = surface_from_ > 0 && shot >= surface_from_;
+  faults_.next_shot_is(shot, of_surface ? shot - surface_from_ + 1 : 0);
+  if (std::exchange(set_out_, robot_.busy_from()) != robot_.busy_from()) faults_.arm_sets_out();
+  plate_ = faults_.lies(put_down_);
 }
 
 void SimulatedWorld::step(hal::Instant now) {
   account(now);
   robot_.step(now);
   scanner_->step(now);
+  if (has_faults_) look_at_faults(now);
   const auto& robot = robot_.counters();
   began_ |= robot.motions + robot.calibrations + scanner_->counters().exposures > 0;
   const std::uint64_t done = robot_.commands_done() + scanner_->counters().frames_sent;

@@ -13,6 +13,7 @@
 #pragma once
 
 #include "host_sim/cell/cell_description.hpp"
+#include "host_sim/faults/fault_acts.hpp"
 
 namespace moldloft::host_sim {
 
@@ -34,17 +35,22 @@ struct CellTimes {
   }
 };
 
-class SimulatedWorld final : public Scene {
+class SimulatedWorld final : public Scene, private RobotWhim {
  public:
   SimulatedWorld(const CellDescription&, PlateInstance, hal::ByteLink& scanner_device,
                  hal::ByteLink& robot_device);
 
   void step(hal::Instant now);
 
-  const PlateInstance& plate() const override { return plate_; }
+  const PlateInstance& plate() const override { return plate_; }  // where it lies now
+  bool plate_has_moved() const { return faults_.plate_has_moved(); }
+  // The shots from now on are of the surface, as far as faults ask for that.
+  void surface_begins() noexcept {
+    if (surface_from_ == 0) surface_from_ = scanner_->counters().exposures + 1;
+  }
   geometry::RigidMotion world_from_scanner(hal::Instant at) const override;
   geometry::RigidMotion world_from_tip(hal::Instant at) const {
-    return robot_.drive().true_world_from_tip(at);
+    return faults_.arm_stands(robot_.drive().true_world_from_tip(at));
   }
 
   CellTimes times() const noexcept { return at_last_done_; }
@@ -52,9 +58,17 @@ class SimulatedWorld final : public Scene {
   RobotServer& robot() noexcept { return robot_; }
 
  private:
+  hal::Pose says(const hal::Pose& encoders) const override { return faults_.robot_says(encoders); }
+  bool stays() const override { return faults_.robot_stays(); }
+  void spoil(hal::Frame& frame) const override { faults_.spoil(frame); }
+  void look_at_faults(hal::Instant now);
   void account(hal::Instant now);
 
-  PlateInstance plate_;
+  bool has_faults_;
+  mutable FaultActs faults_;  // a frozen scanner remembers what it has seen
+  PlateInstance put_down_, plate_;
+  hal::Instant set_out_{0};         // when the arm did last
+  std::uint64_t surface_from_ = 0;  // the shot with which the surface begins; 0: not yet
   geometry::RigidMotion tip_from_scanner_;
   RobotServer robot_;
   hal::Duration exposure_;  // of a shot

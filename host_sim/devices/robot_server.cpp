@@ -16,11 +16,13 @@ using robot_line::Verb;
 namespace {
 
 constexpr hal::Duration event_period = std::chrono::seconds{1};  // of EVT, until SYN
+constexpr hal::Duration time_pretended =
+    std::chrono::milliseconds{300};  // of a motion that does not take place
 
 }  // namespace
 
-RobotServer::RobotServer(hal::ByteLink& link, ArmDrive drive, const RobotTimes& times)
-    : link_(link), drive_(std::move(drive)), times_(times) {}
+RobotServer::RobotServer(hal::ByteLink& link, ArmDrive drive, const RobotTimes& times, const RobotWhim* whim)
+    : link_(link), drive_(std::move(drive)), times_(times), whim_(whim) {}
 
 void RobotServer::step(hal::Instant now) {
   const hal::LinkState link = link_.state();
@@ -115,7 +117,7 @@ void RobotServer::answer_question(const robot_line::Command& question, hal::Inst
       reply.status.last_error = last_error_;
       break;
     case Verb::pos:
-      reply.pose = drive_.reported_pose(now);
+      reply.pose = said_pose(now);
       break;
     case Verb::stp:
       abort_work(Error::stopped, now);
@@ -154,6 +156,11 @@ void RobotServer::execute(const robot_line::Command& command, hal::Instant now) 
     return begin_work(now, now + times_.calibration, now + times_.calibration);
   }
   if (!calibrated_) return failed(Error::not_calibrated, "the arm is not calibrated");
+  if (whim_ != nullptr && whim_->stays()) {
+    begin_work(now, now + time_pretended, now + time_pretended);
+    fate_pose_ = command.pose;
+    return;
+  }
   if (const auto started = drive_.start(command.pose, command.speed_percent, now); !started) {
     return failed(Error::out_of_reach, started.error().text);
   }
@@ -179,9 +186,14 @@ void RobotServer::finish_work(hal::Instant now) {
   ++commands_done_;
   if (fate_ != Fate::under_way) return;  // SYN has forgotten it
   fate_ = abort_code_ == 0 ? Fate::done : Fate::failed;
-  fate_pose_ = drive_.reported_pose(now);
+  if (whim_ == nullptr || !whim_->stays()) fate_pose_ = said_pose(now);
   if (abort_code_ != 0) fate_code_ = last_error_ = abort_code_;
   send_fate();
+}
+
+hal::Pose RobotServer::said_pose(hal::Instant now) const {
+  const hal::Pose encoders = drive_.reported_pose(now);
+  return whim_ == nullptr ? encoders : whim_->says(encoders);
 }
 
 // Brakes. The command's number is answered by ERR once the arm stands.

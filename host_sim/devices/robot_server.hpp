@@ -31,15 +31,28 @@ struct RobotCounters {
   std::uint32_t most_executions = 0;  // of one number since its SYN: more than 1 breaks the contract
 };
 
+// What a robot makes of its encoders before it says where it stands, and whether it obeys. One that is as it should be
+// has none.
+class RobotWhim {
+ public:
+  virtual hal::Pose says(const hal::Pose& encoders) const = 0;
+  virtual bool stays() const = 0;  // where it is, and confirms motions all the same
+
+ protected:
+  ~RobotWhim() = default;
+};
+
 class RobotServer {
  public:
-  RobotServer(hal::ByteLink&, ArmDrive, const RobotTimes&);
+  RobotServer(hal::ByteLink&, ArmDrive, const RobotTimes&, const RobotWhim* = nullptr);
 
   void step(hal::Instant now);
   void power_cycle(hal::Instant now);
   void press_emergency_stop(hal::Instant now);
   // The key on the controller: in manual mode nothing that the host sends moves the arm.
   void turn_key(bool manual, hal::Instant now);
+  // Somebody moves the arm by its pendant, and no line tells.
+  void jog(const hal::Pose& to, hal::Instant now) { static_cast<void>(drive_.start(to, 100, now)); }
   void release_emergency_stop() noexcept { emergency_stop_ = false; }
   void switch_power(bool on, hal::Instant now);
 
@@ -67,6 +80,7 @@ class RobotServer {
   void abort_work(hal::robot_line::Error, hal::Instant now);
   bool stands(hal::Instant now) const noexcept { return !working_ && !drive_.moving(now); }
   void watch(hal::Instant now);
+  hal::Pose said_pose(hal::Instant now) const;
   void send_fate();
   void send(const hal::robot_line::Reply&);
   void refuse(int number, hal::robot_line::Refusal);
@@ -77,6 +91,7 @@ class RobotServer {
   hal::ByteLink& link_;
   ArmDrive drive_;
   RobotTimes times_;
+  const RobotWhim* whim_;
   RobotCounters counters_;
 
   bool connected_ = false, synchronised_ = false, calibrated_ = false, power_ = true, emergency_stop_ = false;

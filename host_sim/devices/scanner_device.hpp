@@ -22,6 +22,8 @@ class Scene {
   virtual ~Scene() = default;
   virtual const PlateInstance& plate() const = 0;
   virtual geometry::RigidMotion world_from_scanner(hal::Instant at) const = 0;
+  // What is wrong with a frame that has just been exposed, done to it.
+  virtual void spoil(hal::Frame&) const {}
 };
 
 struct ScannerTimes {

@@ -228,6 +228,7 @@ void ScannerServer::work(hal::Instant now) {
     }
     Random random(seed_, Stream::optics, counters_.exposures);
     optics_.expose(scene_.plate(), world_from_scanner, random, raster_, frame_);
+    scene_.spoil(frame_);
     frame_.shot_id = shot_id_;
     frame_.session_id = session_id_;
     frame_.exposed_sensor_ns = static_cast<std::uint64_t>(middle.count());

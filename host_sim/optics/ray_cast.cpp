@@ -61,11 +61,13 @@ void RayCast::look_at(const PlateInstance& instance) noexcept {
   z_max_ = plate_->bounds().z_max + 0.01;
   table_z_ = instance.table_z_mm - instance.z_mm;
   thickness_ = plate_->thickness_mm();
-  const auto& outline = plate_->outline();
   edges_.clear();
-  for (std::size_t i = 0; i < outline.size(); ++i) {
-    edges_.push_back({outline[i], outline[(i + 1) % outline.size()] - outline[i]});
-  }
+  const auto add = [this](const std::vector<Eigen::Vector2d>& border) {
+    for (std::size_t i = 0; i < border.size(); ++i)
+      edges_.push_back({border[i], border[(i + 1) % border.size()] - border[i]});
+  };
+  add(plate_->outline());
+  for (const auto& hole : plate_->holes()) add(hole);
 }
 
 void RayCast::edges_within(const PlanWindow& window, std::span<const PlanEdge> from,

@@ -48,6 +48,8 @@ class Plate {
   const std::vector<Eigen::Vector2d>& outline() const noexcept {
     return outline_;
   }  // counter-clockwise, closed
+  // Borders of holes in it, clockwise, so that the plate lies on their left too; empty for most.
+  const std::vector<std::vector<Eigen::Vector2d>>& holes() const noexcept { return holes_; }
   const std::array<Eigen::Vector2d, 4>& corners() const noexcept { return corners_; }  // counter-clockwise
   // What a person should know of a plate that was read from a file; one line without an end, empty for formulas.
   const std::string& remarks() const noexcept { return remarks_; }
@@ -57,6 +59,7 @@ class Plate {
  protected:
   std::string name_, remarks_;
   std::vector<Eigen::Vector2d> outline_;
+  std::vector<std::vector<Eigen::Vector2d>> holes_;
   std::array<Eigen::Vector2d, 4> corners_{};
   double thickness_mm_ = 0;
   PlateBounds bounds_;

@@ -2,32 +2,26 @@
 
 #include "firmware_like/commands/option_values.hpp"
 #include "firmware_like/process/console.hpp"
+#include "host_sim/runs/campaign_rows.hpp"
+#include "host_sim/runs/hard_campaign.hpp"
 #include "host_sim/runs/simulated_run.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <atomic>
 #include <filesystem>
 #include <limits>
-#include <mutex>
-#include <thread>
 #include <unistd.h>
 #include <vector>
 
 namespace moldloft::host_sim {
 
-using firmware_like::flush_shown;
 using firmware_like::say;
 using firmware_like::show;
 namespace {
 
 using firmware_like::Json;
-
-// What every plate of the standard campaign must keep to (README, "What it reaches").
-constexpr double max_normal_rms_mm = 0.02, max_normal_max_mm = 0.08, max_outline_mm = 0.3,
-                 max_corner_mm = 0.3;
 
 // Some hours of all plates; more is a slip of the finger.
 constexpr std::uint64_t most_seeds = 10'000;
@@ -49,27 +43,17 @@ struct Row {
 
 std::vector<Job> jobs_for(const CampaignOptions& options) {
   std::vector<Job> jobs;
+  const SeedRange seeds = options.seeds.value_or(SeedRange{});
   for (const auto& plate : shape_names()) {
     if (options.plates != "all" && options.plates != plate) continue;
     for (const auto& outline : outline_names()) {
       if (options.outlines != "all" && options.outlines != outline) continue;
-      for (auto left = options.seeds.last - options.seeds.first + 1, seed = options.seeds.first; left > 0;
-           --left, ++seed) {
+      for (auto left = seeds.last - seeds.first + 1, seed = seeds.first; left > 0; --left, ++seed) {
         jobs.push_back({std::string{plate}, *outline_named(outline), std::string{outline}, seed});
       }
     }
   }
   return jobs;
-}
-
-double number(const Json& truth, const char* key) {
-  return truth.contains(key) ? truth[key].get<double>() : 0;
-}
-
-bool within_limits(const Json& truth) {
-  return number(truth, "normal_rms_mm") <= max_normal_rms_mm &&
-         number(truth, "normal_max_mm") <= max_normal_max_mm &&
-         number(truth, "outline_max_mm") <= max_outline_mm && number(truth, "corner_max_mm") <= max_corner_mm;
 }
 
 Row run_job(const CampaignOptions& options, const Job& job, const std::filesystem::path& root) {
@@ -99,9 +83,9 @@ void print_row(const Row& r) {
     show(fmt::format("  {}\n", r.message));
     return;
   }
-  show(fmt::format("{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}{}\n", number(r.truth, "normal_rms_mm"),
-                   number(r.truth, "normal_max_mm"), number(r.truth, "outline_max_mm"),
-                   number(r.truth, "corner_max_mm"), r.good ? "" : "  beyond the limits"));
+  show(fmt::format("{:>10.4f}{:>10.4f}{:>10.4f}{:>10.4f}{}\n", truth_figure(r.truth, "normal_rms_mm"),
+                   truth_figure(r.truth, "normal_max_mm"), truth_figure(r.truth, "outline_max_mm"),
+                   truth_figure(r.truth, "corner_max_mm"), r.good ? "" : "  beyond the limits"));
 }
 
 void print_summary(const std::vector<Row>& rows) {
@@ -115,8 +99,8 @@ void print_summary(const std::vector<Row>& rows) {
                                    {"corner_max_mm", max_corner_mm}}) {
     double worst = 0, sum = 0;
     for (const auto& r : rows) {
-      worst = std::max(worst, number(r.truth, key));
-      sum += number(r.truth, key);
+      worst = std::max(worst, truth_figure(r.truth, key));
+      sum += truth_figure(r.truth, key);
     }
     show(fmt::format("{:<16} mean {:>8.4f}  worst {:>8.4f}  limit {:>6.2f}\n", key,
                      sum / static_cast<double>(std::max<std::ptrdiff_t>(complete, 1)), worst, limit));
@@ -140,10 +124,11 @@ std::expected<SeedRange, SimError> seeds_from(std::string_view text) {
 }
 
 int run_campaign(const CampaignOptions& options) {
+  if (options.plates == hard_plates) return run_hard_campaign(options);
   const auto jobs = jobs_for(options);
   if (jobs.empty()) {
     say(fmt::format(
-        "moldloft-sim campaign: nothing to run; --plates all or one of {}; --outlines all or one of "
+        "moldloft-sim campaign: nothing to run; --plates all, hard or one of {}; --outlines all or one of "
         "{}; --seeds A..B\n",
         fmt::join(shape_names(), ", "), fmt::join(outline_names(), ", ")));
     return 1;
@@ -152,31 +137,15 @@ int run_campaign(const CampaignOptions& options) {
   const std::filesystem::path root =
       keep ? std::filesystem::path{options.out}
            : std::filesystem::temp_directory_path() / fmt::format("moldloft-campaign-{}", ::getpid());
-  std::vector<Row> rows(jobs.size());
-  std::vector<bool> ready(jobs.size(), false);
-  std::atomic<std::size_t> next{0};
-  std::mutex printing;
-  std::size_t printed = 0;
   if (!options.json) {
     show(fmt::format("{:<10}{:<15}{:>5}  {:<10}{:>10}{:>10}{:>10}{:>10}\n", "plate", "outline", "seed",
                      "result", "rms mm", "max mm", "outline", "corner"));
   }
-  const auto work = [&] {
-    for (std::size_t i = next++; i < jobs.size(); i = next++) {
-      Row row = run_job(options, jobs[i], root);
-      const std::lock_guard lock{printing};
-      rows[i] = std::move(row);
-      ready[i] = true;
-      // Rows appear in the order of the table, whichever run ends first.
-      for (; !options.json && printed < rows.size() && ready[printed]; ++printed) {
-        print_row(rows[printed]);
-        flush_shown();
-      }
-    }
-  };
-  std::vector<std::thread> threads;
-  for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i) threads.emplace_back(work);
-  for (auto& thread : threads) thread.join();
+  const auto rows = rows_of<Row>(
+      jobs.size(), [&](std::size_t i) { return run_job(options, jobs[i], root); },
+      [&](const Row& row) {
+        if (!options.json) print_row(row);
+      });
   std::error_code ignored;
   if (!keep) std::filesystem::remove_all(root, ignored);
 

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <expected>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -19,9 +20,9 @@ std::expected<SeedRange, SimError> seeds_from(std::string_view text);
 
 struct CampaignOptions {
   CellDescription cell;          // what all runs have in common
-  std::string plates = "all";    // or one shape's name
+  std::string plates = "all";    // or one shape's name, or hard (hard_campaign.hpp)
   std::string outlines = "all";  // or one outline's name
-  SeedRange seeds;
+  std::optional<SeedRange> seeds;  // 1..3 unless given; of the hard campaign 1..400
   bool json = false;
   std::string out;  // keep the run folders here; empty: they are removed
 };

@@ -95,6 +95,13 @@ class DeviceLog {
 }  // namespace
 
 int run_devices(const DeviceOptions& options) {
+  for (const Fault& fault : options.cell.faults) {
+    if (fault.of_surface)
+      return failed(
+          {fmt::format("--fault {}: devices do not know which shots are of the surface: give a "
+                       "number of a shot",
+                       text_of(fault))});
+  }
   const auto plate = placed_plate(options.cell);
   if (!plate) return failed(plate.error());
   if (const auto& remarks = plate->plate->remarks(); !remarks.empty())

@@ -60,6 +60,7 @@ void run_to_rest(Controller& controller, const SimulatedCell& cell, hal::Clock& 
   controller.start();
   for (int ticks = 1; controller.tick() && clock.now() < options.time_limit; ++ticks) {
     if (options.on_tick) options.on_tick(cell, clock.now());
+    if (controller.cell().phase() == tasks::Phase::scan_surface) cell.world.surface_begins();
     const bool takes = !options.disk_takes || options.disk_takes();
     if (takes && ticks % ticks_between_drains == 0) controller.recorder().drain(cell.store);
     if (options.on_progress && ticks % ticks_between_reports == 0)
@@ -82,6 +83,18 @@ std::expected<firmware_like::RunFolder, firmware_like::Failure> folder_for(
   if (names.plate.empty()) names.plate = shape_and_seed(options.cell);
   return firmware_like::create_run(options.out, config.text, *firmware_like::make_of(config.scanner).codec,
                                    firmware_like::RunKind::simulated, names);
+}
+
+// A plate that was moved meanwhile may be measured where it lay or where it lies: the better of the two counts.
+std::expected<Verdict, SimError> judge_where_it_lay(const PlateInstance& put_down,
+                                                    const SimulatedWorld& world,
+                                                    const firmware_like::MeasuredPlate& measured) {
+  const auto first = judge(put_down, measured.surface, measured.outline.corners);
+  if (!world.plate_has_moved()) return first;
+  const auto last = judge(world.plate(), measured.surface, measured.outline.corners);
+  if (!first || !last) return first ? first : last;
+  const auto worst = [](const Verdict& v) { return std::max(v.outline_max_mm, v.normal_max_mm); };
+  return worst(*last) < worst(*first) ? last : first;
 }
 
 }  // namespace
@@ -126,7 +139,7 @@ std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& option
   }
   std::optional<firmware_like::PlateField> errors;
   if (result.measured) {
-    const auto verdict = judge(*plate, result.measured->surface, result.measured->outline.corners);
+    const auto verdict = judge_where_it_lay(*plate, world, *result.measured);
     if (!verdict) return std::unexpected{verdict.error()};
     result.truth = truth_json(*verdict);
     if (options.write_everything) errors = error_field(*verdict, result.measured->surface, 56);

@@ -2,6 +2,10 @@
 // guard first. A target that the guard refuses is never sent. Nothing else in this room holds a robot that it
 // could move; parts that only ask for its state get a const one.
 //
+// What the robot says of where it stands comes in here as well, and is asked the motion guard too: found(),
+// has_arrived() and still_stands() say why a pose is not believed. After one that was not, the robot is synchronised
+// again before it is believed anew (clear_fault()).
+//
 // Thread       the control thread
 // Blocking     never
 // Allocation   none
@@ -30,12 +34,19 @@ class ArmGate {
     hal::Message why{};  // for refused: which limit, by how much
   };
 
-  ArmGate(hal::Robot& robot, const Workspace& workspace, int speed_percent)
-      : robot_{robot}, workspace_{workspace}, speed_percent_{speed_percent} {}
+  ArmGate(hal::Robot& robot, const Workspace& workspace, int speed_percent, const Arrival& arrival = {})
+      : robot_{robot}, workspace_{workspace}, arrival_{arrival}, speed_percent_{speed_percent} {}
 
   Sending send_checked(const hal::Pose& target, hal::Instant now) MOLDLOFT_NONBLOCKING;
   // The same check, for choosing among targets; nothing when the target may be sent.
   std::optional<hal::Message> refuse(const hal::Pose& target) const MOLDLOFT_NONBLOCKING;
+
+  // Where the arm says that it stands: after it was found or has calibrated, at the end of a motion to `target`, while
+  // it was sent nowhere. Nothing when that is believed, else why not.
+  std::optional<hal::Message> found(const hal::Pose& reported) MOLDLOFT_NONBLOCKING;
+  std::optional<hal::Message> has_arrived(const hal::Pose& reported,
+                                          const hal::Pose& target) MOLDLOFT_NONBLOCKING;
+  std::optional<hal::Message> still_stands(const hal::Pose& reported) MOLDLOFT_NONBLOCKING;
 
   void stands_at(const hal::Pose& reported) MOLDLOFT_NONBLOCKING { standing_ = reported; }
   const hal::Pose& standing() const MOLDLOFT_NONBLOCKING { return standing_; }
@@ -44,15 +55,17 @@ class ArmGate {
   void start(hal::Instant now) MOLDLOFT_NONBLOCKING { robot_.start(now); }
   void calibrate(hal::Instant now) MOLDLOFT_NONBLOCKING { robot_.calibrate(now); }
   void stop(hal::Instant now) MOLDLOFT_NONBLOCKING { robot_.stop(now); }
-  void clear_fault(hal::Instant now) MOLDLOFT_NONBLOCKING;
+  void clear_fault(hal::Instant now) MOLDLOFT_NONBLOCKING;  // and what was not believed
   std::optional<hal::RobotEvent> next_event() MOLDLOFT_NONBLOCKING { return robot_.next_event(); }
   const hal::Robot& robot() const MOLDLOFT_NONBLOCKING { return robot_; }
 
  private:
   hal::Robot& robot_;
   Workspace workspace_;
+  Arrival arrival_;
   int speed_percent_;
   hal::Pose standing_;
+  bool in_doubt_ = false;
 };
 
 }  // namespace moldloft::tasks

@@ -8,7 +8,7 @@ Cell::Cell(const CellSettings& settings, hal::Scanner& scanner, hal::Robot& robo
            SurfaceTask& surface, const ShotArchive* archive)
     : settings_{settings},
       scanner_{scanner},
-      arm_{robot, settings.workspace, settings.speed_percent},
+      arm_{robot, settings.workspace, settings.speed_percent, settings.arrival},
       supervisor_{recorder, *this},
       disk_{settings_, supervisor_, recorder},
       start_{settings_, supervisor_, scanner, arm_},
@@ -70,14 +70,16 @@ void Cell::on_robot(const hal::RobotEvent& event) {
   using Kind = hal::RobotEvent::Kind;
   switch (event.kind) {
     case Kind::ready:
-      arm_.stands_at(event.pose);
       start_.robot_is_ready(event.calibrated);
-      return supervisor_.record("robot", "ready", "", "", event.text);
+      supervisor_.record("robot", "ready", "", "", event.text);
+      // An arm that is not calibrated does not know where it stands; it says so once it is.
+      return event.calibrated ? on_found(event.pose) : arm_.stands_at(event.pose);
     case Kind::moving:
       return;
     case Kind::done:
-      arm_.stands_at(event.pose);
-      if (!start_.takes_end_of_motion()) shots_.on_arrival(event.pose);
+      return start_.takes_end_of_motion() ? on_found(event.pose) : shots_.on_arrival(event.pose);
+    case Kind::stands:
+      if (shots_.on_standing(event.pose)) measurement_.frame_is_lost();
       return;
     case Kind::refused:
       supervisor_.record("robot", "refused", "", "", event.text);
@@ -88,6 +90,15 @@ void Cell::on_robot(const hal::RobotEvent& event) {
       supervisor_.record("robot", event.kind == Kind::fault ? "fault" : "lost", "", "", event.text);
       return supervisor_.abort(event.text);
   }
+}
+
+// Before a run nothing is lost by ending it; in a run the shots are kept.
+void Cell::on_found(const hal::Pose& reported) {
+  const auto no = arm_.found(reported);
+  if (!no) return;
+  supervisor_.record("robot", "implausible", "", "", *no);
+  if (supervisor_.state() == CellState::starting) return supervisor_.abort(*no, HoldCause::measurement);
+  supervisor_.hold(HoldCause::person, *no);
 }
 
 void Cell::on_scanner(const hal::ScannerEvent& event) {

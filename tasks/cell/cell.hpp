@@ -85,6 +85,7 @@ class Cell final : public Task, public CellPort, private CellActions {
  private:
   void carry_out(CellAction) MOLDLOFT_NONBLOCKING override;
   void on_robot(const hal::RobotEvent&) MOLDLOFT_NONBLOCKING;
+  void on_found(const hal::Pose& reported) MOLDLOFT_NONBLOCKING;
   void on_scanner(const hal::ScannerEvent&) MOLDLOFT_NONBLOCKING;
   void advance_state() MOLDLOFT_NONBLOCKING;
   void look_whether_cause_has_passed() MOLDLOFT_NONBLOCKING;

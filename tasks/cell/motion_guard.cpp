@@ -17,6 +17,34 @@ std::optional<hal::Message> outside(const char* what, double value, const Range&
       what, value, range.min, range.max);
 }
 
+std::optional<hal::Message> stands_outside(const char* what, double value, const Range& range,
+                                           double parked_mm) {
+  if (Range{range.min - parked_mm, range.max + parked_mm}.contains(value)) return std::nullopt;
+  return hal::Message::format(
+      "the robot says it stands at {} {:.1f} mm, [robot.workspace] ends at {:.1f} mm: bring it nearer, "
+      "correct its units, or raise [robot.workspace] parked_mm",
+      what, value, value < range.min ? range.min : range.max);
+}
+
+hal::Message not_finite() {
+  return "the robot says it stands at no place at all (a pose that is not finite): correct its program";
+}
+
+struct Difference {
+  double distance_mm = 0, turn_rad = 0;
+  bool is_within(const Arrival& limits) const {
+    return distance_mm <= limits.distance_mm && turn_rad <= limits.turn_rad;
+  }
+};
+
+Difference difference(const hal::Pose& a, const hal::Pose& b) {
+  const geometry::RigidMotion one = motion_of(a), other = motion_of(b);
+  // Of two rotations that differ by the angle a, the matrices differ by 2 sqrt(2) sin(a / 2) in the Frobenius norm.
+  const double sine = (one.linear() - other.linear()).norm() / (2 * std::numbers::sqrt2);
+  return {.distance_mm = (one.translation() - other.translation()).norm(),
+          .turn_rad = 2 * std::asin(std::min(1.0, sine))};
+}
+
 }  // namespace
 
 std::optional<hal::Message> refuse_target(const hal::Pose& target, const hal::Pose& standing,
@@ -38,16 +66,34 @@ std::optional<hal::Message> refuse_target(const hal::Pose& target, const hal::Po
 
 std::optional<hal::Message> refuse_arrival(const hal::Pose& reported, const hal::Pose& commanded,
                                            const Arrival& limits) {
-  const geometry::RigidMotion is = motion_of(reported), was_meant = motion_of(commanded);
-  const double distance = (is.translation() - was_meant.translation()).norm();
-  // Of two rotations that differ by the angle a, the matrices differ by 2 sqrt(2) sin(a / 2) in the Frobenius norm.
-  const double sine = (is.linear() - was_meant.linear()).norm() / (2 * std::numbers::sqrt2);
-  const double turn = 2 * std::asin(std::min(1.0, sine));
-  if (distance <= limits.distance_mm && turn <= limits.turn_rad) return std::nullopt;
+  if (!is_finite(reported)) return not_finite();
+  const Difference off = difference(reported, commanded);
+  if (off.is_within(limits)) return std::nullopt;
   return hal::Message::format(
-      "the robot says it has arrived {:.1f} mm and {:.1f} degrees off its target ([robot] arrival_mm, "
+      "the robot says it has arrived {:.2f} mm and {:.2f} degrees off its target ([robot] arrival_mm, "
       "arrival_deg: {:.3g}, {:.3g}): look where the arm stands",
-      distance, turn / hal::degree, limits.distance_mm, limits.turn_rad / hal::degree);
+      off.distance_mm, off.turn_rad / hal::degree, limits.distance_mm, limits.turn_rad / hal::degree);
+}
+
+std::optional<hal::Message> refuse_standing(const hal::Pose& reported, const Workspace& workspace) {
+  if (!is_finite(reported)) return not_finite();
+  const double parked = workspace.parked_mm;
+  if (auto no = stands_outside("x", reported.x_mm, workspace.x_mm, parked)) return no;
+  if (auto no = stands_outside("y", reported.y_mm, workspace.y_mm, parked)) return no;
+  if (auto no = stands_outside("z", reported.z_mm, workspace.z_mm, parked)) return no;
+  return stands_outside("reach", std::hypot(reported.x_mm, reported.y_mm), workspace.reach_mm, parked);
+}
+
+std::optional<hal::Message> refuse_drift(const hal::Pose& reported, const hal::Pose& stood,
+                                         const Arrival& limits) {
+  if (!is_finite(reported)) return not_finite();
+  const Difference off = difference(reported, stood);
+  if (off.is_within(limits)) return std::nullopt;
+  return hal::Message::format(
+      "the robot says it stands {:.2f} mm and {:.2f} degrees from where it said it stopped ([robot] "
+      "arrival_mm, "
+      "arrival_deg): look whether it moved, or who moves it",
+      off.distance_mm, off.turn_rad / hal::degree);
 }
 
 }  // namespace moldloft::tasks

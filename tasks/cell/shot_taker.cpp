@@ -100,6 +100,12 @@ void ShotTaker::carry_out(ShotAction action) {
       return deliver();
     case ShotAction::deliver:
       return deliver();
+    case ShotAction::drive_again:
+      arrival_doubted_ = true;
+      return;
+    case ShotAction::drop_and_drive_again:
+      arrival_doubted_ = true;
+      return scanner_.forget_shot();
     case ShotAction::give_up:
     case ShotAction::none:
       return;
@@ -166,13 +172,26 @@ void ShotTaker::commands_sent(hal::Instant now) {
 
 // A pose far from the target is no place to take a shot at: it would be registered there.
 void ShotTaker::on_arrival(const hal::Pose& reported) {
-  if (const auto no = refuse_arrival(reported, arm_.commanded, settings_.arrival);
-      no && !supervisor_.is_ending()) {
+  const auto no = arm_gate_.has_arrived(reported, arm_.commanded);
+  if (no && !supervisor_.is_ending()) {
     supervisor_.record("robot", "implausible", "", "", *no);
     arrival_doubted_ = true;
     return supervisor_.hold(HoldCause::person, *no);
   }
   apply(ShotEvent::arrived);
+}
+
+// An arm that has moved by itself was elsewhere at some time: a shot that was taken meanwhile, and not looked at yet,
+// is not used. The same target is driven to once more. While the cell does not run, whoever holds it may move the arm.
+bool ShotTaker::on_standing(const hal::Pose& reported) {
+  if (supervisor_.state() != CellState::execute || arrival_doubted_) return false;
+  const auto no = arm_gate_.still_stands(reported);
+  if (!no) return false;
+  const bool frame_is_lost = state_ == ShotState::exposing || state_ == ShotState::computing;
+  supervisor_.record("robot", "implausible", "", "", *no);
+  apply(ShotEvent::doubted);
+  supervisor_.hold(HoldCause::person, *no);
+  return frame_is_lost;
 }
 
 void ShotTaker::on_refusal(const hal::Message& text) {

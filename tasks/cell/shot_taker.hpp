@@ -77,6 +77,8 @@ class ShotTaker {
 
   // ---- what the devices come to
   void on_arrival(const hal::Pose& reported) MOLDLOFT_NONBLOCKING;
+  // Where the arm stands that was sent nowhere; true when a frame that is on its way is not used for it.
+  bool on_standing(const hal::Pose& reported) MOLDLOFT_NONBLOCKING;
   void on_refusal(const hal::Message&) MOLDLOFT_NONBLOCKING;  // of a target, by the robot
   void on_exposed(std::uint32_t shot_id) MOLDLOFT_NONBLOCKING;
   void on_arriving(std::uint32_t shot_id) MOLDLOFT_NONBLOCKING;

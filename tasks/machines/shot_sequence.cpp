@@ -28,6 +28,12 @@ constexpr ShotTransition table[] = {
     {S::driving_computing,   E::failed,   any,   A::give_up,               S::driving},
     {S::in_place_computing,  E::frame,    any,   A::deliver,               S::in_place},
     {S::in_place_computing,  E::failed,   any,   A::give_up,               S::in_place},
+
+    // The arm has moved by itself: it is sent to the same target once more, and what it may have seen counts for nothing.
+    {S::in_place,            E::doubted,  any,   A::drive_again,           S::driving},
+    {S::in_place_computing,  E::doubted,  any,   A::drive_again,           S::driving_computing},
+    {S::exposing,            E::doubted,  any,   A::drop_and_drive_again,  S::driving},
+    {S::computing,           E::doubted,  any,   A::drop_and_drive_again,  S::driving},
 };
 
 constexpr hal::Ignored<S, E> ignored[] = {
@@ -38,14 +44,16 @@ constexpr hal::Ignored<S, E> ignored[] = {
     {S::computing, E::arrived}, {S::computing, E::clear}, {S::computing, E::exposed},
     {S::driving_computing, E::order}, {S::driving_computing, E::clear}, {S::driving_computing, E::exposed},
     {S::in_place_computing, E::order}, {S::in_place_computing, E::arrived}, {S::in_place_computing, E::clear}, {S::in_place_computing, E::exposed},
+    {S::parked, E::doubted}, {S::driving, E::doubted}, {S::driving_computing, E::doubted},
 };
 
 constexpr std::array<std::string_view, shot_state_count> state_names = {
     "parked", "driving", "in place", "exposing", "computing", "driving, computing", "in place, computing"};
 constexpr std::array<std::string_view, shot_event_count> event_names = {
-    "order", "arrived", "clear", "exposed", "frame", "failed"};
-constexpr std::array<std::string_view, 8> action_names = {
-    "none", "drive", "note pose", "trigger", "release arm", "deliver", "release and deliver", "give up"};
+    "order", "arrived", "clear", "exposed", "frame", "failed", "doubted"};
+constexpr std::array<std::string_view, 10> action_names = {
+    "none", "drive", "note pose", "trigger", "release arm", "deliver", "release and deliver", "give up",
+    "drive again", "drop and drive again"};
 // clang-format on
 
 }  // namespace

@@ -31,9 +31,10 @@ enum class ShotEvent : std::uint8_t {
   clear,    // an exposure is allowed: the scanner is ready, recorder and fit have room
   exposed,
   frame,
-  failed,  // the driver has given the shot up
+  failed,   // the driver has given the shot up
+  doubted,  // the arm has moved although it was sent nowhere
 };
-constexpr int shot_event_count = 6;
+constexpr int shot_event_count = 7;
 
 enum class ShotAction : std::uint8_t {
   none,
@@ -44,6 +45,8 @@ enum class ShotAction : std::uint8_t {
   deliver,
   release_and_deliver,
   give_up,
+  drive_again,
+  drop_and_drive_again,
 };
 
 struct ShotContext {};

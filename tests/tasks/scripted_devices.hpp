@@ -53,7 +53,7 @@ class ScriptedScanner final : public hal::Scanner {
   std::deque<hal::ScannerEvent> events;
   std::vector<std::uint32_t> triggers;
   hal::Frame last{1, 1};
-  int starts = 0;
+  int starts = 0, forgotten = 0;
 
   void start(hal::Instant) override { ++starts; }
   void receive(hal::Instant) override {}
@@ -62,7 +62,7 @@ class ScriptedScanner final : public hal::Scanner {
     triggers.push_back(shot_id);
     return true;
   }
-  void forget_shot() override {}
+  void forget_shot() override { ++forgotten; }
   std::optional<hal::ScannerEvent> next_event() override {
     if (events.empty()) return std::nullopt;
     const auto event = events.front();

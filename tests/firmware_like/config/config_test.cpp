@@ -57,8 +57,8 @@ std::string values(const CellConfig& c) {
                      s.noise_mm, s.depth_mm, mount) +
          fmt::format("{} {} {} {} {} ", c.robot.driver, c.robot.place.link + c.robot.place.device,
                      c.robot.place.baud, c.robot.speed_percent, c.robot.repeatability_z_mm) +
-         fmt::format("{} {} {} {} {} {} ", range(w.x_mm), range(w.y_mm), range(w.z_mm), range(w.reach_mm),
-                     w.max_step_mm, w.max_speed_percent) +
+         fmt::format("{} {} {} {} {} {} {} ", range(w.x_mm), range(w.y_mm), range(w.z_mm), range(w.reach_mm),
+                     w.parked_mm, w.max_step_mm, w.max_speed_percent) +
          fmt::format("{} {} {} {} ", c.plate.table_z_mm, c.plate.thickness_mm, c.plate.largest_x_mm,
                      c.plate.largest_y_mm) +
          fmt::format("{} {} {} {:.9f} ", c.start.centre.x(), c.start.centre.y(), c.start.centre.z(),
@@ -104,6 +104,7 @@ std::string changed(const std::string& line) {
                                                                          {"y_mm", "[-700, 700]"},
                                                                          {"z_mm", "[250, 550]"},
                                                                          {"reach_mm", "[210, 790]"},
+                                                                         {"parked_mm", "100"},
                                                                          {"max_step_mm", "1400"},
                                                                          {"max_speed_percent", "90"},
                                                                          {"thickness_mm", "8"},

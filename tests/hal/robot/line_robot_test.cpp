@@ -429,11 +429,17 @@ TEST_CASE("the heartbeat: never more than 1 s without a line to the robot") {
   Cell cell;
   cell.start();
   cell.run(10s);
-  CHECK(cell.peer.times_heard("0000 PNG") == 10);
+  // An arm that stands is asked in turn how it is and where it stands; each once at the start.
+  CHECK(cell.peer.times_heard("0000 STA") == 1 + 5);
+  CHECK(cell.peer.times_heard("0000 POS") == 1 + 5);
   cell.peer.motion_time = 5s;
   REQUIRE(cell.robot.move(there, 50, cell.clock.now()));
   REQUIRE(cell.run_until(Kind::done));
-  CHECK(cell.peer.times_heard("0000 STA") == 1 + 5);  // in motion the heartbeat asks for the status
+  CHECK(cell.peer.times_heard("0000 STA") == 1 + 5 + 5);  // in motion the heartbeat asks for the status
+  cell.peer.press_emergency_stop();
+  REQUIRE(cell.run_until(Kind::fault));
+  cell.run(5s);
+  CHECK(cell.peer.times_heard("0000 PNG") == 5);  // a fault is waited out
 }
 
 TEST_CASE("a motion that does not end within the limit is stopped and a fault") {

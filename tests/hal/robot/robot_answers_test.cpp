@@ -211,3 +211,78 @@ TEST_CASE("a line of 120 characters is read, one of 121 is not, and CR and empty
   CHECK(loss_of(cell.robot, "garbled lines") == 2);
   CHECK(cell.robot.state() == RobotState::ready);
 }
+
+TEST_CASE("an arm that stands is asked where, and two answers in a row of another place are told") {
+  Cell cell;
+  cell.start();
+  REQUIRE(cell.robot.move(there, 50, cell.clock.now()));
+  REQUIRE(cell.run_until(Kind::done));
+  const auto asked = cell.peer.times_heard("0000 POS");
+  cell.run(3500ms);
+  CHECK(cell.peer.times_heard("0000 POS") - asked == 2);  // 50 ms after DON, then by turns with STA
+  CHECK(cell.events.back().kind == Kind::done);
+  cell.peer.pose.y_mm += 2;  // somebody pushes it
+  REQUIRE(cell.run_until(Kind::stands));
+  CHECK(cell.events.back().pose.y_mm == doctest::Approx(-86.12));
+  cell.events.clear();
+  cell.run(5s);
+  CHECK(cell.events.empty());  // told once
+}
+
+TEST_CASE("one answer of another place, such as an old line that comes twice, is not believed") {
+  Cell cell;
+  cell.start();
+  REQUIRE(cell.robot.move(there, 50, cell.clock.now()));
+  REQUIRE(cell.run_until(Kind::done));
+  cell.events.clear();
+  int answers = 0;
+  cell.peer.on_reply = [&](std::string& line) {
+    if (line.starts_with("<0000 POS") && ++answers % 2 == 1)
+      line = std::string{
+          robot_line::format(robot_line::Reply{.pose = {.x_mm = 1}, .answers = Verb::pos}).view()};
+    return true;
+  };
+  cell.run(20s);
+  CHECK(answers > 10);
+  CHECK(cell.events.empty());
+}
+
+TEST_CASE("a robot that confirms a motion and has not moved is found out by where it says it stands") {
+  Cell cell;
+  cell.start();
+  const Pose before = cell.peer.pose;
+  cell.peer.on_reply = [&](std::string& line) {
+    if (line.find(" DON ") != line.npos) cell.peer.pose = before;  // DON says the target, POS the truth
+    return true;
+  };
+  REQUIRE(cell.robot.move(there, 50, cell.clock.now()));
+  REQUIRE(cell.run_until(Kind::done));
+  CHECK(cell.events.back().pose == there);
+  REQUIRE(cell.run_until(Kind::stands));
+  CHECK(cell.events.back().pose == before);
+}
+
+TEST_CASE("numbers that no field holds, said under a right checksum, are a fault that shows the line") {
+  for (const char* pose :
+       {"nan 0.000 155.000 0.000 180.000 35.000", "inf 0.000 155.000 0.000 180.000 35.000",
+        "1000000.000 0.000 155.000 0.000 180.000 35.000", "4.1e2 0.000 155.000 0.000 180.000 35.000",
+        "412.350 -88.120 155.000", "412,350 -88.120 155.000 0.000 180.000 35.000", ""}) {
+    CAPTURE(pose);
+    Cell cell;
+    cell.start();
+    cell.peer.on_reply = [&](std::string& line) {
+      if (line.starts_with("<0001 DON")) {
+        const std::string text = "0001 DON"s + (*pose == 0 ? "" : " ") + pose;
+        line = "<" + text + " *" + std::to_string(robot_line::fletcher16(text)) + "\n";
+      }
+      return true;
+    };
+    REQUIRE(cell.robot.move(there, 50, cell.clock.now()));
+    const Instant sent = cell.clock.now();
+    REQUIRE(cell.run_until(Kind::fault));
+    CHECK(cell.clock.now() - sent < 1s);  // not when a command takes too long
+    CHECK(cell.events.back().text.view().find("cannot be read, wrong fields") != std::string_view::npos);
+    CHECK(cell.events.back().text.view().find("<0001 DON") != std::string_view::npos);
+    CHECK(cell.peer.motions == 1);
+  }
+}

@@ -43,6 +43,16 @@ TEST_CASE("an option that is misspelt or given twice and a word too many are tol
              "moldloft run: --out is given 2 times; give it once");
   check_line({MOLDLOFT, "run", "a.toml", "b.toml"}, "moldloft run: 'b.toml' is one word too many");
   check_line({MOLDLOFT, "run"}, "moldloft run: config is required");
+  check_line(
+      {MOLDLOFT_SIM, "cell", "--fault", "robot-lie 5"},
+      "moldloft-sim: --fault: 'robot-lie 5': no fault is called so; known are robot-lies, robot-tilts, "
+      "robot-slips, robot-leans, robot-drifts, robot-stays, scanner-blind, scanner-freezes, "
+      "scanner-scales, scanner-mirrors, noise, plate-pushed, plate-turned, plate-lifted, mount-yawed, "
+      "mount-shifted");
+  check_line(
+      {MOLDLOFT_SIM, "devices", "--fault", "noise 5, scanner-blind 1 from surface"},
+      "moldloft-sim devices: --fault scanner-blind 1 from surface: devices do not know which shots are "
+      "of the surface: give a number of a shot");
   check_line({MOLDLOFT_SIM, "cell", "--seed", "1", "--seed", "7"},
              "moldloft-sim cell: --seed is given 2 times; give it once");
   check_line({MOLDLOFT, "run", "cell.toml", "--n\xE9\n"},

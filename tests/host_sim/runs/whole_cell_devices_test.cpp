@@ -71,12 +71,12 @@ TEST_CASE(
     const char *of, *says;
     hal::Pose (*elsewhere)(hal::Pose);
   } wrong[] = {
-      {"digits that changed", "mm and 0.0 degrees off its target",
+      {"digits that changed", "mm and 0.00 degrees off its target",
        [](hal::Pose p) { return p.x_mm = 999999.999, p; }},
-      {"a pitch of 90", "0.0 mm and 90.0 degrees off its target",
+      {"a pitch of 90", "0.00 mm and 90.00 degrees off its target",
        [](hal::Pose p) { return p.pitch = 90 * hal::degree, p; }},
-      {"a wrong tool", "6.0 mm and 0.0 degrees off its target", [](hal::Pose p) { return p.z_mm += 6, p; }},
-      {"a turned head", "0.0 mm and 3.0 degrees off its target",
+      {"a wrong tool", "6.00 mm and 0.00 degrees off its target", [](hal::Pose p) { return p.z_mm += 6, p; }},
+      {"a turned head", "0.00 mm and 3.00 degrees off its target",
        [](hal::Pose p) { return p.roll += 3 * hal::degree, p; }},
   };
   for (const auto& w : wrong) {
@@ -97,7 +97,7 @@ TEST_CASE(
     CHECK(run.exit_code == firmware_like::exit_held);
     CAPTURE(message(run));
     CHECK(message(run).find(w.says) != std::string::npos);
-    CHECK(message(run).find("[robot] arrival_mm, arrival_deg: 5, 2") != std::string::npos);
+    CHECK(message(run).find("[robot] arrival_mm, arrival_deg: 0.15, 0.03") != std::string::npos);
     CHECK(cell.exposures == shots_before);
   }
 }

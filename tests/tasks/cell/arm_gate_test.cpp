@@ -50,7 +50,7 @@ struct Bench final : CellActions, ShotUser {
   void carry_out(CellAction) override {}
   bool takes_frame() const override { return true; }
   void frame_comes(const ShotOrder&, const hal::Frame&, hal::Scanner*) override {}
-  void frame_is_whole(const ShotOrder&, const hal::Frame&, hal::Scanner*, bool) override {}
+  void frame_is_whole(const ShotOrder&, const hal::Frame&, hal::Scanner*, bool) override { ++whole; }
   void arm_is_free() override {}
   bool visit_again(const ShotPlace&) override { return false; }
 
@@ -65,6 +65,7 @@ struct Bench final : CellActions, ShotUser {
     supervisor.done();
   }
 
+  int whole = 0;
   CellSettings settings;
   ScriptedRobot robot;
   ScriptedScanner scanner;
@@ -165,6 +166,55 @@ TEST_CASE("after an arrival in doubt the same target is checked again from where
     CHECK(bench.robot.moves.size() == 1);
     CHECK(bench.supervisor.state() == CellState::aborting);
     CHECK(says(bench.supervisor.why(), "outside the workspace: step"));
+  }
+}
+
+TEST_CASE("an arm that moves by itself is sent to its target again, and what it may have seen is not used") {
+  Bench bench;
+  bench.order(600);
+  const hal::Pose target = bench.robot.moves.at(0);
+  bench.shots.on_arrival(target);
+  const auto stand = [&](double off_mm) {
+    hal::Pose pose = target;
+    pose.y_mm += off_mm;
+    return bench.shots.on_standing(pose);
+  };
+  CHECK_FALSE(stand(0.14));
+  CHECK(bench.supervisor.state() == CellState::execute);
+  const auto come_back = [&] {
+    CHECK(bench.supervisor.state() == CellState::holding);
+    CHECK(says(bench.supervisor.why(), "from where it said it stopped"));
+    bench.unhold();
+    bench.shots.step();
+    CHECK(bench.robot.moves == std::vector{target, target});
+    CHECK(bench.scanner.triggers.size() <= 1);  // not before it has arrived
+    bench.shots.on_arrival(target);
+    bench.shots.step();
+  };
+  SUBCASE("before the exposure") {
+    bench.scanner.is = hal::ScannerState::offline;
+    bench.shots.step();
+    CHECK_FALSE(stand(2));
+    come_back();
+    bench.scanner.is = hal::ScannerState::ready;
+    bench.shots.step();
+    CHECK(bench.scanner.triggers.size() == 1);
+    CHECK(bench.scanner.forgotten == 0);
+  }
+  SUBCASE("after the exposure, before its frame") {
+    bench.shots.step();
+    REQUIRE(bench.scanner.triggers.size() == 1);
+    bench.shots.on_exposed(bench.scanner.triggers[0]);
+    CHECK(stand(2));
+    bench.shots.on_frame();  // it comes all the same, and counts for nothing
+    come_back();
+    REQUIRE(bench.scanner.triggers.size() == 2);
+    CHECK(bench.scanner.triggers[1] != bench.scanner.triggers[0]);
+    CHECK(bench.scanner.forgotten == 1);
+    CHECK(bench.whole == 0);
+    bench.shots.on_exposed(bench.scanner.triggers[1]);
+    bench.shots.on_frame();
+    CHECK(bench.whole == 1);
   }
 }
 
