@@ -2,6 +2,7 @@
 
 #include "firmware_like/config/device_makes.hpp"
 #include "geometry/edges/outline_check.hpp"
+#include "tasks/planning/tool_pose.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -13,6 +14,12 @@ namespace {
 // Turned heads, retakes and corners cost shots beyond what the perimeter asks for.
 constexpr double spare_boundary_shots = 1.5;
 constexpr int few_shots = 16;
+
+// Turned heads, half steps and other heights while the edge is sought.
+constexpr int spare_seek_shots = 16;
+
+// Of the depth range: how far a plate that is not seen is sought higher or lower. The rest is overlap.
+constexpr double storey_share = 1.6;
 
 // Heartbeats and answers that come between the frames.
 constexpr std::size_t spare_bytes = 4096;
@@ -65,7 +72,12 @@ tasks::CellSettings cell_settings(const CellConfig& c) {
   s.tracker.crossing = c.tracking_crossing_deg * hal::degree;
   s.tracker.seek_step_mm = c.seek_step_mm;
   s.tracker.max_seek_steps = static_cast<int>(c.seek_limit_mm / c.seek_step_mm);
-  s.tracker.max_shots = boundary_shots(c) + s.tracker.max_seek_steps;
+  // The tip's heights are the workspace's; the field's centre lies where the mount puts it.
+  const double tip_over_field = tasks::tip_pose_for({}, c.scanner.tip_from_scanner).z_mm;
+  s.tracker.lowest_z_mm = c.robot.workspace.z_mm.min - tip_over_field;
+  s.tracker.highest_z_mm = c.robot.workspace.z_mm.max - tip_over_field;
+  s.tracker.storey_mm = storey_share * c.scanner.depth_mm;
+  s.tracker.max_shots = boundary_shots(c) + s.tracker.max_seek_steps + spare_seek_shots;
   s.tracker.max_edge_points = static_cast<std::size_t>(boundary_shots(c)) * 2 * s.max_stripes;
 
   s.scan = {.field_x_mm = c.scanner.field_x_mm,
@@ -76,6 +88,7 @@ tasks::CellSettings cell_settings(const CellConfig& c) {
   s.view.runs.noise_mm = c.scanner.noise_mm;
   s.view.runs.min_step_mm = c.plate.thickness_mm / 4;
   s.view.runs.field_half_y_mm = half_y;
+  s.view.runs.depth_mm = c.scanner.depth_mm;
   s.view.boundary.stripe_pitch_mm = pitch;
   s.view.boundary.field_half_x_mm = half_x;
   s.view.boundary.field_half_y_mm = half_y;

@@ -409,10 +409,14 @@ PlateRun PlateRunFinder::described(std::uint32_t i, const PlateRunSettings& sett
   const std::size_t rays_above = stripe.z.size() - 1 - out.last;
   const bool low_limit = at_field_limit(-run.y_first, out.first, spacing_first, settings);
   const bool high_limit = at_field_limit(run.y_last, rays_above, spacing_last, settings);
-  out.at_first =
-      low_limit ? RunEnd::field_limit : kind_of_end(below ? neighbour(i - 1, false) : Neighbour{}, settings);
-  out.at_last =
-      high_limit ? RunEnd::field_limit : kind_of_end(above ? neighbour(i + 1, true) : Neighbour{}, settings);
+  const auto end_at = [&](bool at_limit, const Neighbour& beyond, std::uint32_t point) {
+    if (at_limit) return RunEnd::field_limit;
+    const RunEnd end = kind_of_end(beyond, settings);
+    const bool is_deep = std::abs(stripe.z[point]) > settings.depth_mm - settings.depth_margin_mm;
+    return end == RunEnd::free_end && is_deep ? RunEnd::out_of_depth : end;
+  };
+  out.at_first = end_at(low_limit, below ? neighbour(i - 1, false) : Neighbour{}, out.first);
+  out.at_last = end_at(high_limit, above ? neighbour(i + 1, true) : Neighbour{}, out.last);
   return out;
 }
 

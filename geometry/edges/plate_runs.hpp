@@ -24,6 +24,7 @@
 
 #include <cstdint>
 #include <expected>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -37,10 +38,11 @@ struct StripeView {  // columns of equal length, ordered along +y; NaN where a p
 };
 
 enum class RunEnd : std::uint8_t {
-  field_limit,  // the stripe itself ends here: the plate goes on, unseen
-  step_down,    // the surface drops: the plate's edge
-  free_end,     // nothing is measured beyond: the plate's edge, the ground out of range or in the shadow
-  hidden,       // the surface rises: something nearer covers what comes; not an edge
+  field_limit,   // the stripe itself ends here: the plate goes on, unseen
+  step_down,     // the surface drops: the plate's edge
+  free_end,      // nothing is measured beyond: the plate's edge, the ground out of range or in the shadow
+  hidden,        // the surface rises: something nearer covers what comes; not an edge
+  out_of_depth,  // the surface leaves the depths that the scanner measures; not an edge
 };
 
 constexpr bool is_edge(RunEnd end) { return end == RunEnd::step_down || end == RunEnd::free_end; }
@@ -60,6 +62,10 @@ struct PlateRunSettings {
   double min_run_mm = 3.0;        // shorter runs are outliers
   double field_half_y_mm = 51.0;  // a run that ends within field_margin_mm of it ends at the field's limit
   double field_margin_mm = 1.0;
+  // Heights are measured within this, to each side of the field's centre. A run that ends within depth_margin_mm of it,
+  // with nothing measured beyond, ends there because of it.
+  double depth_mm = std::numeric_limits<double>::infinity();
+  double depth_margin_mm = 1.0;
   double hint_reach_mm = 15.0;  // a hint farther than this from every run hits nothing
 };
 

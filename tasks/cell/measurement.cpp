@@ -24,6 +24,9 @@ constexpr double hint_reach_mm = 18;
 // How far inside the outline the hint of a surface shot lies, when the field's centre is outside.
 constexpr double hint_inside_mm = 10;
 
+// A point that was seen so near to the tracker's hint is a better one.
+constexpr double seen_near_mm = 8;
+
 // Between a known point of the plate and the field's border: what is nearer may lie beyond it in the frame.
 constexpr double hint_margin_mm = 3;
 
@@ -328,7 +331,11 @@ void Measurement::look_again_where_plate_is() {
 }
 
 Eigen::Vector3d Measurement::hint_in_world(const ShotOrder& order) const {
-  if (order.purpose != ShotPurpose::surface) return tracker_.plate_hint();
+  if (order.purpose != ShotPurpose::surface) {
+    // A centimetre inside its edge a steep plate lies elsewhere, the table perhaps nearer: what was seen there knows.
+    const Eigen::Vector3d hint = tracker_.plate_hint();
+    return evidence_.known_near({.centre = hint}, seen_near_mm, seen_near_mm).value_or(hint);
+  }
   if (const auto known = known_in_field(order.place, 1)) return *known;
   const auto& corners = surface_.outline().corners;
   const Eigen::Vector2d middle = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;

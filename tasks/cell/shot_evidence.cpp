@@ -12,10 +12,6 @@ namespace {
 constexpr std::uint16_t stripe_stride = 3;  // of the runs that are kept
 constexpr std::uint32_t sample_stride = 24;
 
-// A run that ends so near to the limit of the depth range, as a share of it, ends because of the limit. The
-// slope of a plate takes the stripe's next point beyond it.
-constexpr double depth_share = 0.97;
-
 template <typename T>
 std::span<const T> part(const std::vector<T>& all, std::size_t begin, std::size_t end) {
   return std::span{all}.subspan(begin, end - begin);
@@ -48,9 +44,9 @@ void EvidenceBook::begin() {
   kept_.samples.clear();
 }
 
-RunEdge EvidenceBook::edge_at(geometry::RunEnd end, const Eigen::Vector3d& in_scanner) const {
-  if (!geometry::is_edge(end)) return RunEdge::none;
-  return std::abs(in_scanner.z()) > depth_share * settings_.depth_mm ? RunEdge::out_of_depth : RunEdge::edge;
+RunEdge EvidenceBook::edge_at(geometry::RunEnd end) {
+  if (end == geometry::RunEnd::out_of_depth) return RunEdge::out_of_depth;
+  return geometry::is_edge(end) ? RunEdge::edge : RunEdge::none;
 }
 
 void EvidenceBook::add_runs(const geometry::RigidMotion& world_from_scanner, const ShotView& view) {
@@ -61,8 +57,8 @@ void EvidenceBook::add_runs(const geometry::RigidMotion& world_from_scanner, con
     const Eigen::Vector3d first = view.first_of(run), last = view.last_of(run);
     hal::add_within_reserve(kept_.runs, SeenRun{.first = world_from_scanner * first,
                                                 .last = world_from_scanner * last,
-                                                .at_first = edge_at(run.at_first, first),
-                                                .at_last = edge_at(run.at_last, last)});
+                                                .at_first = edge_at(run.at_first),
+                                                .at_last = edge_at(run.at_last)});
   }
 }
 

@@ -83,7 +83,7 @@ class EvidenceBook {
  private:
   static constexpr std::size_t runs_a_shot = 48, samples_a_shot = 128;
   void add_runs(const geometry::RigidMotion& world_from_scanner, const ShotView&) MOLDLOFT_NONBLOCKING;
-  RunEdge edge_at(geometry::RunEnd, const Eigen::Vector3d& in_scanner) const MOLDLOFT_NONBLOCKING;
+  static RunEdge edge_at(geometry::RunEnd) MOLDLOFT_NONBLOCKING;
 
   Settings settings_;
   RunEvidence kept_;

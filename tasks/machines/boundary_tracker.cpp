@@ -50,8 +50,11 @@ std::size_t BoundaryTracker::bytes() const {
 void BoundaryTracker::begin(const ShotPlace& start) {
   state_ = TrackState::seek_edge;
   counts_ = TrackContext{.max_seek_steps = settings_.max_seek_steps,
+                         .max_half_steps = settings_.max_half_steps,
                          .max_turns = settings_.max_turns,
                          .max_backs = settings_.max_backs};
+  start_z_mm_ = start.centre.z();
+  counts_.max_heights = heights_within_limits();
   shots_ = 0;
   place_ = start;
   hint_ = front_ = start.centre;
@@ -161,8 +164,8 @@ void BoundaryTracker::move_front(const Piece& piece) {
   front_ = piece.exit;
 }
 
-ShotPlace BoundaryTracker::carry_out(TrackAction action, const Piece& piece) {
-  const double stripe = place_.head_yaw + pi / 2;
+// Where to look next while no edge has been seen.
+ShotPlace BoundaryTracker::seek_on(TrackAction action) {
   ShotPlace next = place_;
   switch (action) {
     case TrackAction::step_along_x:
@@ -172,7 +175,33 @@ ShotPlace BoundaryTracker::carry_out(TrackAction action, const Piece& piece) {
       hint_ = next.centre;
       hint_.x() += std::min(settings_.field_half_x_mm, settings_.field_half_y_mm) - hint_inside_mm;
       next.centre.x() += settings_.seek_step_mm;
-      return next;
+      break;
+    case TrackAction::step_half_along_x:
+      // What hides at this field's border lies inside the next.
+      ++counts_.half_steps;
+      counts_.turns = 0;
+      hint_ = next.centre;
+      hint_.z() = next.centre.z() = plate_z_mm_;
+      next.centre.x() += settings_.seek_step_mm / 2;
+      break;
+    case TrackAction::change_height:
+      next.centre.z() = height_to_try(counts_.heights++);
+      hint_ = next.centre;
+      break;
+    default:
+      break;
+  }
+  return next;
+}
+
+ShotPlace BoundaryTracker::carry_out(TrackAction action, const Piece& piece) {
+  const double stripe = place_.head_yaw + pi / 2;
+  ShotPlace next = place_;
+  switch (action) {
+    case TrackAction::step_along_x:
+    case TrackAction::step_half_along_x:
+    case TrackAction::change_height:
+      return seek_on(action);
     case TrackAction::centre_on_edge:
       heading_ = piece.tangent_first;
       front_ = piece.nearest;
@@ -256,12 +285,33 @@ double BoundaryTracker::yaw_crossing_both(double heading, double stripe) const {
   return (worst(a) >= worst(b) ? a : b) - pi / 2;
 }
 
+// Above, below, two above, and so on, as far as the arm goes: the count-th of them.
+double BoundaryTracker::height_to_try(int count) const {
+  int found = 0;
+  for (int storey = 1; storey <= 2 * settings_.max_heights; ++storey) {
+    for (const int way : {1, -1}) {
+      const double z = start_z_mm_ + way * storey * settings_.storey_mm;
+      if (z < settings_.lowest_z_mm || z > settings_.highest_z_mm) continue;
+      if (found++ == count) return z;
+    }
+  }
+  return start_z_mm_;
+}
+
+int BoundaryTracker::heights_within_limits() const {
+  int count = 0;
+  while (count < settings_.max_heights && height_to_try(count) != start_z_mm_) ++count;
+  return count;
+}
+
 hal::Message BoundaryTracker::explain(TrackAction action) const {
   const double x = place_.centre.x(), y = place_.centre.y();
   switch (action) {
     case TrackAction::report_off_plate:
       return hal::Message::format(
-          "no plate under the scanner at x {:.0f} y {:.0f} mm: move [start] onto the plate", x, y);
+          "no plate under the scanner at x {:.0f} y {:.0f} mm, looked for at {} heights: move [start] onto "
+          "the plate",
+          x, y, counts_.heights + 1);
     case TrackAction::report_no_edge:
       return hal::Message::format(
           "no edge from the start pose to x {:.0f} mm: is [start] on the plate to measure?", x);

@@ -21,6 +21,7 @@
 #include <Eigen/Core>
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -52,6 +53,8 @@ constexpr int track_event_count = 7;
 enum class TrackAction : std::uint8_t {
   none,
   step_along_x,
+  step_half_along_x,
+  change_height,
   centre_on_edge,
   begin_outline,
   advance,
@@ -66,8 +69,8 @@ enum class TrackAction : std::uint8_t {
 };
 
 struct TrackContext {
-  int seek_steps = 0, turns = 0, backs = 0;
-  int max_seek_steps = 0, max_turns = 0, max_backs = 0;
+  int seek_steps = 0, half_steps = 0, turns = 0, backs = 0, heights = 0;
+  int max_seek_steps = 0, max_half_steps = 0, max_turns = 0, max_backs = 0, max_heights = 0;
 };
 
 using TrackTransition = hal::Transition<TrackState, TrackEvent, TrackAction, TrackContext>;
@@ -86,6 +89,12 @@ struct TrackerSettings {
   double seek_step_mm = 70;
   double close_mm = 8;          // the loop is closed where a piece passes this near to its beginning
   double corner_merge_mm = 20;  // corners nearer than this are one, seen twice
+  // The field's centre stays between these; a plate that is not seen at one height is sought a storey higher or lower.
+  double lowest_z_mm = -std::numeric_limits<double>::infinity();
+  double highest_z_mm = std::numeric_limits<double>::infinity();
+  double storey_mm = 96;
+  int max_heights = 5;  // besides the start's
+  int max_half_steps = 2;
   int max_seek_steps = 60, max_turns = 3, max_backs = 2, max_shots = 96;
   std::size_t max_edge_points = 24000;
 };
@@ -133,11 +142,14 @@ class BoundaryTracker {
   void remember_edges(const Seen&);
   void remember_corner(const Eigen::Vector2d&);
   void move_front(const Piece&);
+  ShotPlace seek_on(TrackAction);
   ShotPlace carry_out(TrackAction, const Piece&);
   ShotPlace ahead() const;
   double healthy_yaw(double yaw) const;
   double yaw_crossing_both(double heading, double stripe) const;
   hal::Message explain(TrackAction) const;
+  int heights_within_limits() const;
+  double height_to_try(int count) const;
 
   TrackerSettings settings_;
   TrackState state_ = TrackState::seek_edge;
@@ -147,6 +159,7 @@ class BoundaryTracker {
   Eigen::Vector3d front_{0, 0, 0}, hint_{0, 0, 0};
   Eigen::Vector2d heading_{1, 0}, anchor_{0, 0};
   double plate_z_mm_ = 0;
+  double start_z_mm_ = 0;
   double turned_ = 0;  // rad, of the heading since the outline began
   std::vector<Eigen::Vector2d> edges_, corners_;
 };

@@ -13,18 +13,25 @@ constexpr hal::Guard<TrackContext> may_seek{
     "steps left", [](const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.seek_steps < c.max_seek_steps; }};
 constexpr hal::Guard<TrackContext> may_turn{
     "turns left", [](const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.turns < c.max_turns; }};
+constexpr hal::Guard<TrackContext> may_half{
+    "half steps left",
+    [](const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.half_steps < c.max_half_steps; }};
+constexpr hal::Guard<TrackContext> may_rise{
+    "heights left", [](const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.heights < c.max_heights; }};
 constexpr hal::Guard<TrackContext> may_back{
     "steps back left", [](const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.backs < c.max_backs; }};
 
 // clang-format off
 constexpr TrackTransition table[] = {
     // from           event                  guard     action                to
+    {S::seek_edge,    E::no_plate,           may_rise, A::change_height,     S::seek_edge},
     {S::seek_edge,    E::no_plate,           any,      A::report_off_plate,  S::failed},
     {S::seek_edge,    E::plate_fills_field,  may_seek, A::step_along_x,      S::seek_edge},
     {S::seek_edge,    E::plate_fills_field,  any,      A::report_no_edge,    S::failed},
     {S::seek_edge,    E::side,               any,      A::centre_on_edge,    S::first_side},
     {S::seek_edge,    E::corner,             any,      A::centre_on_edge,    S::first_side},
     {S::seek_edge,    E::hidden,             may_turn, A::turn,              S::seek_edge},
+    {S::seek_edge,    E::hidden,             may_half, A::step_half_along_x, S::seek_edge},
     {S::seek_edge,    E::hidden,             any,      A::report_hidden,     S::failed},
 
     {S::first_side,   E::side,               any,      A::begin_outline,     S::track},
@@ -77,8 +84,8 @@ constexpr std::array<std::string_view, track_state_count> state_names = {
     "seek edge", "first side", "track", "turn head", "step back", "closed", "failed"};
 constexpr std::array<std::string_view, track_event_count> event_names = {
     "no plate", "plate fills field", "side", "corner", "hidden", "loop closed", "beyond plan"};
-constexpr std::array<std::string_view, 13> action_names = {
-    "none", "step along x", "centre on edge", "begin outline", "advance", "turn", "back up", "finish",
+constexpr std::array<std::string_view, 15> action_names = {
+    "none", "step along x", "step half along x", "change height", "centre on edge", "begin outline", "advance", "turn", "back up", "finish",
     "report off plate", "report no edge", "report lost", "report hidden", "report too large"};
 // clang-format on
 

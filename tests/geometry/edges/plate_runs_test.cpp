@@ -251,3 +251,25 @@ TEST_CASE("a frame cut in any portions, stripes of unequal length included, give
     }
   }
 }
+
+TEST_CASE("where the depth range ends is no edge of the plate") {
+  // The plate rises along the stripes; what would follow at 10 mm lies higher than the scanner measures.
+  StripeScene scene;
+  scene.outline = rectangle({-200, -200}, 0, 400, 210);
+  scene.height = [](double, double y) { return y; };
+  scene.table = false;
+  const test::Frame frame = sample(scene);
+  PlateRunFinder finder(100, 50'000);
+  PlateRunSettings settings;
+  const auto last_end = [&] {
+    const auto runs = finder.find(frame.views, {0, 0, 0}, settings);
+    REQUIRE(runs.has_value());
+    return (*runs)[7].at_last;
+  };
+  CHECK(last_end() == RunEnd::free_end);
+  settings.depth_mm = 10.5;
+  CHECK(last_end() == RunEnd::out_of_depth);
+  CHECK_FALSE(is_edge(RunEnd::out_of_depth));
+  settings.depth_mm = 12;
+  CHECK(last_end() == RunEnd::free_end);
+}

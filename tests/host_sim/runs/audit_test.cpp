@@ -27,8 +27,10 @@ TEST_CASE("plates that swing farther than the boundary tells are seen whole") {
     double width_mm, depth_mm;  // 0: as the cell has it
     std::uint64_t seed;
   };
-  for (const auto& plate : {Plate{"wave", ArmKind::scara, 25, 0, 0, 4}, Plate{"wave", ArmKind::gantry, 32, 900, 600, 3},
-                            Plate{"saddle", ArmKind::scara, 30, 0, 0, 2}}) {
+  for (const auto& plate :
+       {Plate{"wave", ArmKind::scara, 25, 0, 0, 4}, Plate{"wave", ArmKind::gantry, 32, 900, 600, 3},
+        Plate{"saddle", ArmKind::scara, 30, 0, 0, 2}, Plate{"dome", ArmKind::scara, 32, 0, 0, 1},
+        Plate{"wave", ArmKind::scara, 38, 0, 0, 1}}) {
     CAPTURE(plate.shape);
     CAPTURE(plate.seed);
     ScriptedRun cell;
@@ -40,10 +42,19 @@ TEST_CASE("plates that swing farther than the boundary tells are seen whole") {
     description.sizes.depth_mm = plate.depth_mm;
     description.seed = plate.seed;
     const auto run = cell.run();
-    CHECK(run.exit_code == firmware_like::exit_done);
-    CHECK(run.summary["findings"].empty());
+    // On steep plates errors in plan show in height, and the audit may say so.
+    CHECK((run.exit_code == firmware_like::exit_done ||
+           kinds(run.summary) == std::vector<std::string>{"shot_heights"}));
     CHECK(run.summary["truth"]["normal_max_mm"].get<double>() < 0.08);
   }
+}
+
+TEST_CASE("a plate that lies above the depth range is found a storey higher") {
+  ScriptedRun cell;
+  cell.options.cell.thickness_mm = 100;
+  const auto run = cell.run();
+  CHECK(run.exit_code == firmware_like::exit_done);
+  check_truth(run.summary);
 }
 
 TEST_CASE("a scanner noisier than promised is measured with a warning, in the run and in every fit of it") {

@@ -112,14 +112,33 @@ TEST_CASE(
   CHECK(std::abs(std::cos(stripe)) > 0.7);  // across the old stripes, along which the rest hides
 }
 
-TEST_CASE("a start off the plate is said so at once") {
+TEST_CASE("a start off the plate is said so when every height has been looked at") {
   BoundaryTracker tracker{TrackerSettings{}};
   const FlatWorld world{.outline = placed(square, 0)};
   const Walk walk = walk_round(tracker, world, {.centre = {900, 20, 5}, .head_yaw = 0});
   CHECK(walk.last.to == TrackState::failed);
-  CHECK(walk.shots == 1);
+  CHECK(walk.shots == 6);
   CHECK(std::string{walk.last.text.view()} ==
-        "no plate under the scanner at x 900 y 20 mm: move [start] onto the plate");
+        "no plate under the scanner at x 900 y 20 mm, looked for at 6 heights: move [start] onto the plate");
+}
+
+TEST_CASE("a plate is sought above and below the start, as far as the arm goes") {
+  BoundaryTracker tracker{TrackerSettings{.lowest_z_mm = -100, .highest_z_mm = 220, .storey_mm = 96}};
+  tracker.begin({.centre = {500, 0, 15}, .head_yaw = 0});
+  std::vector<double> heights;
+  BoundaryTracker::Step step;
+  for (int i = 0; i < 9 && step.to != TrackState::failed; ++i) {
+    step = tracker.take({.world_from_scanner = geometry::turned_about_z(0, {500, 0, 15}),
+                         .plate_found = false,
+                         .plate_z_mm = 0,
+                         .view = {}});
+    if (!step.next) continue;
+    heights.push_back(step.next->centre.z());
+    CHECK(tracker.plate_hint().z() == heights.back());
+  }
+  CHECK(heights == std::vector<double>{111, -81, 207});
+  CHECK(step.to == TrackState::failed);
+  CHECK(step.text.view().find("looked for at 4 heights") != std::string_view::npos);
 }
 
 TEST_CASE("a plate without an end within the seek limit is said so") {
