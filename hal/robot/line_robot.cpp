@@ -401,7 +401,7 @@ void LineRobot::on_answer(const Reply& reply, Instant now) {
   }
 }
 
-// An arm that stands is believed to have moved when two answers in a row say so: one may be an old line that came twice.
+// An arm that stands has moved when two answers in a row say so: one may be an old line that came twice.
 void LineRobot::on_pose(const Pose& pose, Instant now) {
   if (phase_ == Phase::locating) {
     pose_ = pose;

@@ -32,8 +32,8 @@ class LineRobot final : public Robot {
     int resends = 3;  // of a line without an answer, before the robot is asked how it stands
     Duration silent_limit = 3s;     // the robot's own watchdog; an arm that heard nothing has stopped by then
     Duration done_timeout = 60s;    // of one command; the longest path at the lowest speed takes less
-    // After DON, before an arm that still has nothing to do is asked where it stands: a robot that said DON too early, or
-    // only says again what it was told, shows by then. Then once a second.
+    // After DON, before an arm that still has nothing to do is asked where it stands. A robot that said DON too
+    // early, or only repeats its target, shows by then. After that once in two seconds.
     Duration stand_check = 50ms;
     Duration garble_pause = 20ms;   // after a garbled reply, before the same line goes again
     Duration connect_timeout = 2s;  // where the line is a terminal server's socket

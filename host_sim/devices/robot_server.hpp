@@ -31,8 +31,8 @@ struct RobotCounters {
   std::uint32_t most_executions = 0;  // of one number since its SYN: more than 1 breaks the contract
 };
 
-// What a robot makes of its encoders before it says where it stands, and whether it obeys. One that is as it should be
-// has none.
+// What a robot makes of its encoders before it says where it stands, and whether it obeys. An honest
+// robot has none of this.
 class RobotWhim {
  public:
   virtual hal::Pose says(const hal::Pose& encoders) const = 0;

@@ -2,9 +2,9 @@
 //
 //     robot-lies 5 at 7, plate-pushed 3, noise 5
 //
-// A fault begins with a shot, counted from 1: `at 7` is that shot alone, `from 7` that one and all after it, `at surface`
-// and `from surface` the first shot of the surface. Without it a fault is there from the first shot on; a plate is moved
-// once, where nothing else is said before a shot that the seed draws. Directions are drawn from the seed.
+// A fault begins with a shot, counted from 1: `at 7` is that shot alone, `from 7` that one and all after it.
+// `at surface` and `from surface` count from the first shot of the surface. Without either a fault is there from
+// the first shot on. A plate is moved once, and then before a shot that the seed draws. Directions are drawn too.
 //
 // Thread       any
 // Failure      one line that names the word and what is known

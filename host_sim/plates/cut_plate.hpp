@@ -1,7 +1,7 @@
 // A formed plate with an outline of its own, and holes: the surface of one plate, the rim of another.
 //
-// The outline must lie where the base plate's surface is defined (all of the formulas are, everywhere). Holes are
-// polygons inside the outline, as the outline is: counter-clockwise. Corners are those of the largest quadrilateral that
+// The outline must lie where the base plate's surface is defined; the formulas are defined everywhere. Holes are
+// polygons inside the outline, counter-clockwise as it is. Corners are those of the largest quadrilateral that
 // the outline holds.
 #pragma once
 

@@ -1,5 +1,5 @@
-// What campaigns have in common: runs side by side, rows in order as they come, and the limits that a measured plate is
-// held against.
+// What campaigns have in common: runs side by side, rows in order as they come, and the limits that a plate
+// is measured within.
 //
 // Thread       as many runs at a time as there are processors, each in a thread of its own; `show` by one at a time
 #pragma once

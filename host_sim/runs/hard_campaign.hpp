@@ -1,5 +1,6 @@
-// The hard campaign: plates, devices and configurations that go wrong on purpose, and a judge of honesty. A run may be
-// measured, warned of or held; what it may not be is complete and wrong, or in doubt for a cause that is not the true one.
+// The hard campaign: plates, devices and configurations that go wrong on purpose, and a judge of honesty. A run
+// may be measured, warned of or held. It may not be complete and wrong, nor in doubt for another cause than the
+// one that is known.
 #pragma once
 
 #include "firmware_like/process/json_text.hpp"

@@ -29,11 +29,11 @@ struct Workspace {
   double parked_mm = 200;
 };
 
-// How far from its target an arm that says it has arrived may stand, and how far it may drift while it stands. Arms
-// settle within hundredths of a millimetre. A pose this far off comes from a wrong tool, a wrong frame, another convention
-// of angles, digits that the line has changed, or an arm that was stopped on its way. A lie below these bounds leaves an
-// outline within the 0.3 mm that it is promised to, half of which it needs itself; 0.03 degrees are 0.17 mm at the
-// field's centre.
+// How far from its target an arm that says it has arrived may stand, and how far it may drift while it stands.
+// Arms settle within hundredths of a millimetre. A pose this far off comes from a wrong tool, a wrong frame,
+// another convention of angles, digits that the line has changed, or an arm that was stopped on its way. A lie
+// below these bounds leaves an outline within the 0.3 mm that it is promised to, half of which it needs itself.
+// At the field's centre 0.03 degrees are 0.17 mm.
 struct Arrival {
   double distance_mm = 0.15, turn_rad = 0.03 * hal::degree;
 };

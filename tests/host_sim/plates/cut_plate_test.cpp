@@ -41,8 +41,12 @@ TEST_CASE("a step goes along half of one side, and its other sides stay where th
   const auto out = stepped(square, 0, 30);
   REQUIRE(out.size() == 6);
   double lowest_left = 1e9, lowest_right = 1e9;
-  for (const auto& p : out) (p.x() < 0 ? lowest_left : lowest_right) = std::min(p.x() < 0 ? lowest_left : lowest_right, p.y());
+  for (const auto& p : out) {
+    double& lowest = p.x() < 0 ? lowest_left : lowest_right;
+    lowest = std::min(lowest, p.y());
+  }
   CHECK(lowest_left == doctest::Approx(-side / 2));
+  CHECK(lowest_right == doctest::Approx(-side / 2));  // where the step begins, at 0
   CHECK(contains(out, -100, -side / 2 + 15));
   CHECK_FALSE(contains(out, 100, -side / 2 + 15));
 }

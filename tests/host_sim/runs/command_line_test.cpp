@@ -45,7 +45,7 @@ TEST_CASE("an option that is misspelt or given twice and a word too many are tol
   check_line({MOLDLOFT, "run"}, "moldloft run: config is required");
   check_line(
       {MOLDLOFT_SIM, "cell", "--fault", "robot-lie 5"},
-      "moldloft-sim: --fault: 'robot-lie 5': no fault is called so; known are robot-lies, robot-tilts, "
+      "moldloft-sim cell: --fault: 'robot-lie 5': no fault is called so; known are robot-lies, robot-tilts, "
       "robot-slips, robot-leans, robot-drifts, robot-stays, scanner-blind, scanner-freezes, "
       "scanner-scales, scanner-mirrors, noise, plate-pushed, plate-turned, plate-lifted, mount-yawed, "
       "mount-shifted");

@@ -41,8 +41,9 @@ TEST_CASE("what is said must name the cause that is known, in whatever letters, 
 }
 
 TEST_CASE("what a summary says is its message and its findings") {
-  CHECK(words_of_summary(Json::parse(R"({"message": "held", "findings": [{"kind": "x", "text": "a"}, {"text": "b"}]})")) ==
-        std::vector<std::string>{"held", "a", "b"});
+  const Json both =
+      Json::parse(R"({"message": "held", "findings": [{"kind": "x", "text": "a"}, {"text": "b"}]})");
+  CHECK(words_of_summary(both) == std::vector<std::string>{"held", "a", "b"});
   CHECK(words_of_summary(Json::parse(R"({"message": ""})")).empty());
 }
 

@@ -102,6 +102,7 @@ TEST_CASE("somebody who moves the arm while it waits is noticed, and the shot is
     if (pushed && said.empty()) said = c.controller.cell().why().view();
   });
   CHECK(pushed);
+  CAPTURE(said);
   CHECK(mended);
   CHECK(said.find("the robot says it stands 1.50 mm and 0.00 degrees from where it said it stopped") == 0);
   CHECK(run.exit_code == firmware_like::exit_done);
