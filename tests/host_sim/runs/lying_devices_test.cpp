@@ -93,7 +93,7 @@ TEST_CASE("somebody who moves the arm while it waits is noticed, and the shot is
       return controlled.command(tasks::CellEvent::unhold);
     }
     if (!pushed && controlled.shots_taken(hal::ShotPurpose::boundary) == 3 &&
-        c.world.robot().drive().settled(now) && now > c.world.robot().busy_until() + 20ms) {
+        now >= c.world.robot().drive().settled_at() && now > c.world.robot().busy_until() + 20ms) {
       pushed = true;
       hal::Pose beside = c.world.robot().drive().reported_pose(now);
       beside.x_mm += 1.5;
