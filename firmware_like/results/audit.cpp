@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 namespace moldloft::firmware_like {
@@ -163,15 +164,18 @@ void Audit::check_planned_shots() {
                              "it is not in the result",
                              shot.number, place_text(centre))});
   }
-  std::size_t surface_shots = 0;
-  for (const auto& shot : r_.evidence.shots) surface_shots += shot.purpose == hal::ShotPurpose::surface;
-  if (surface_shots < r_.track.surface_places.size())
+  const auto was_taken = [&](const tasks::ShotPlace& place) {
+    return std::ranges::any_of(r_.evidence.shots, [&](const tasks::ShotSeen& shot) {
+      return shot.purpose == hal::ShotPurpose::surface &&
+             (shot.place.centre - place.centre).head<2>().norm() < 1;
+    });
+  };
+  const auto& planned = r_.track.surface_places;
+  if (const auto missed = std::ranges::count_if(planned, std::not_fn(was_taken)); missed > 0)
     named.push_back({.kind = FindingKind::shot_missing,
                      .place = {},
                      .size_mm = r_.track.field_x_mm,
-                     .text = fmt::format("{} of {} planned shots were not taken",
-                                         r_.track.surface_places.size() - surface_shots,
-                                         r_.track.surface_places.size())});
+                     .text = fmt::format("{} of {} planned shots were not taken", missed, planned.size())});
   add_named(std::move(named), "shots");
 }
 

@@ -152,6 +152,7 @@ void Measurement::seek() {
   heights_.reset();
   evidence_.begin();
   health_ = {};
+  has_seen_ = false;
   spent_ = hal::Duration{0};
   time_left_.begin(settings_.start.centre.head<2>());
   surface_.begin();
@@ -231,6 +232,7 @@ void Measurement::use_view() {
 // No two exposures have the same noise: the same heights again are the same frame again.
 bool Measurement::is_of_a_sound_scanner() {
   const FrameHealth before = std::exchange(health_, health_of(view_.frame()));
+  has_seen_ = has_seen_ || !is_blind(health_);
   if (health_.noise_mm == 0 || health_.fingerprint != before.fingerprint) return true;
   supervisor_.hold(HoldCause::measurement,
                    hal::Message::format("the scanner sends the same frame again (shot {}): restart it, then "
@@ -239,9 +241,11 @@ bool Measurement::is_of_a_sound_scanner() {
   return false;
 }
 
-// A plate that cannot be tracked is no news where the scanner itself is at fault.
+// A plate that cannot be tracked is no news where the scanner itself is at fault. One empty frame is no fault: it may
+// look beside the plate.
 void Measurement::hold_for_plate(HoldCause cause, const hal::Message& what) {
-  const auto fault = scanner_fault(health_, settings_.view.runs.noise_mm);
+  auto fault = scanner_fault(health_, settings_.view.runs.noise_mm);
+  if (has_seen_ && is_blind(health_)) fault.reset();
   supervisor_.hold(fault ? HoldCause::measurement : cause, fault.value_or(what));
 }
 

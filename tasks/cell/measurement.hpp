@@ -118,6 +118,7 @@ class Measurement final : public ShotUser {
   ZigzagPlan zigzag_;
   bool plan_begun_ = false;  // the zig-zag's
   FrameHealth health_;       // of the last frame
+  bool has_seen_ = false;    // points, in any frame of the run
   std::array<int, 3> taken_{};
   std::uint64_t points_seen_ = 0;
   TimeLeft time_left_;

@@ -47,8 +47,10 @@ FrameHealth health_of(const hal::Frame& frame) {
   return health;
 }
 
+bool is_blind(const FrameHealth& health) { return health.missing > blind_share * health.looked_at; }
+
 std::optional<hal::Message> scanner_fault(const FrameHealth& health, double promised_noise_mm) {
-  if (health.missing > blind_share * health.looked_at)
+  if (is_blind(health))
     return hal::Message::format(
         "the scanner shows no points: look at laser, shutter and window, and whether anything lies within "
         "its depth "

@@ -27,6 +27,7 @@ struct FrameHealth {
 FrameHealth health_of(const hal::Frame&) MOLDLOFT_NONBLOCKING;
 
 // The scanner's fault, where there is one that makes its frames useless: what was seen and what to do.
+bool is_blind(const FrameHealth&) MOLDLOFT_NONBLOCKING;
 std::optional<hal::Message> scanner_fault(const FrameHealth&, double promised_noise_mm) MOLDLOFT_NONBLOCKING;
 
 }  // namespace moldloft::tasks

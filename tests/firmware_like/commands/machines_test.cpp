@@ -103,12 +103,13 @@ TEST_CASE("the supervisor's stop and abort are notes, all its other rows arrows"
 TEST_CASE("guards stand on the arrows as what they ask for, their complement as else") {
   const std::string diagram = section(firmware_like::cell_diagrams(), "track_table.cpp");
   CHECK(arrow(diagram, "seek edge", "seek edge") ==
-        "plate fills field [steps left] / step along x<br/>hidden [turns left] / turn");
+        "no plate [heights left] / change height<br/>plate fills field [steps left] / step along x"
+        "<br/>hidden [turns left] / turn<br/>hidden [half steps left] / step half along x");
   CHECK(arrow(section(firmware_like::driver_diagrams(), "line_table.cpp"), "commanded", "syncing") ==
         "stands still [stop answered] / report stopped and sync"
         "<br/>reset / start sync<br/>silent / report silence");
   CHECK(arrow(diagram, "seek edge", "failed") ==
-        "no plate / report off plate<br/>plate fills field [else] / report no edge"
+        "no plate [else] / report off plate<br/>plate fills field [else] / report no edge"
         "<br/>hidden [else] / report hidden");
 }
 

@@ -14,10 +14,14 @@ using moldloft::firmware_like::Json;
 
 namespace {
 
-HardRow row(int exit_code, double outline_mm, std::vector<std::string> words = {}, const char* cause = "noise") {
+HardRow row(int exit_code, double outline_mm, std::vector<std::string> words = {},
+            const char* cause = "noise") {
   HardRow r{.seed = 1, .cause = cause, .exit_code = exit_code, .words = std::move(words)};
   for (const auto& word : r.words) r.said += word + " | ";
-  r.truth = {{"normal_rms_mm", 0.01}, {"normal_max_mm", 0.05}, {"outline_max_mm", outline_mm}, {"corner_max_mm", 0.1}};
+  r.truth = {{"normal_rms_mm", 0.01},
+             {"normal_max_mm", 0.05},
+             {"outline_max_mm", outline_mm},
+             {"corner_max_mm", 0.1}};
   return r;
 }
 
@@ -33,8 +37,10 @@ TEST_CASE("only a run that ends with 0 and is beyond the limits is untrue") {
   CHECK(is_untrue(surface));
 }
 
-TEST_CASE("what is said must name the cause that is known, in whatever letters, and silence names none wrongly") {
-  CHECK(says_cause(row(5, 1, {"points lie 0.3 mm off the surface: more Noise than [scanner] noise_mm says"})));
+TEST_CASE(
+    "what is said must name the cause that is known, in whatever letters, and silence names none wrongly") {
+  CHECK(
+      says_cause(row(5, 1, {"points lie 0.3 mm off the surface: more Noise than [scanner] noise_mm says"})));
   CHECK_FALSE(says_cause(row(5, 1, {"shots disagree by 0.9 mm: check [scanner.mount]"})));
   CHECK(says_cause(row(0, 0.1)));
   CHECK_FALSE(says_cause(row(2, 0, {"no plate"}, "sound")));  // nothing is wrong with a sound plate

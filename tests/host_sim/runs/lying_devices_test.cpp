@@ -77,39 +77,3 @@ TEST_CASE("a lie within the bounds is used as it is, and the plate stays within 
   CHECK(run.exit_code == firmware_like::exit_done);
   check_truth(run.summary);
 }
-
-TEST_CASE("somebody who moves the arm while it waits is noticed, and the shot is taken once more") {
-  ScriptedRun cell, undisturbed;
-  cell.options.held = true;  // somebody is there
-  int told = 0;
-  std::string said;
-  bool pushed = false, mended = false;
-  const auto run = cell.run([&](const SimulatedCell& c, hal::Instant now) {
-    auto& controlled = c.controller.cell();
-    if (controlled.state() == tasks::CellState::held && controlled.cause() == tasks::HoldCause::person &&
-        (told == 0 || (pushed && !mended))) {
-      ++told;
-      mended = pushed;
-      return controlled.command(tasks::CellEvent::unhold);
-    }
-    if (!pushed && controlled.shots_taken(hal::ShotPurpose::boundary) == 3 &&
-        now >= c.world.robot().drive().settled_at() && now > c.world.robot().busy_until() + 20ms) {
-      pushed = true;
-      hal::Pose beside = c.world.robot().drive().reported_pose(now);
-      beside.x_mm += 1.5;
-      c.world.robot().jog(beside, now);
-    }
-    if (pushed && said.empty()) said = c.controller.cell().why().view();
-  });
-  CHECK(pushed);
-  CAPTURE(said);
-  CHECK(mended);
-  CHECK(said.find("the robot says it stands 1.50 mm and 0.00 degrees from where it said it stopped") == 0);
-  CHECK(run.exit_code == firmware_like::exit_done);
-  check_truth(run.summary);
-  // The place is driven to once more, and exposed once more.
-  const auto plain = undisturbed.run();
-  CHECK(cell.motions == undisturbed.motions + 1);
-  CHECK(cell.exposures == undisturbed.exposures + 1);
-  CHECK(run.summary["shots"]["boundary"] == plain.summary["shots"]["boundary"]);
-}

@@ -345,8 +345,9 @@ TEST_CASE("a start pose off the plate is held with the place and what to do") {
   cell.set("centre_mm", "centre_mm = [510, 400, 15]");
   const auto run = cell.run();
   CHECK(run.exit_code == firmware_like::exit_held);
-  CHECK(message(run) == "no plate under the scanner at x 510 y 400 mm: move [start] onto the plate");
-  CHECK(cell.shots().size() == 1);  // the look that found nothing can be looked at
+  CHECK(message(run) ==
+        "no plate under the scanner at x 510 y 400 mm, looked for at 2 heights: move [start] onto the plate");
+  CHECK(cell.shots().size() == 2);  // the looks that found nothing can be looked at
 }
 
 TEST_CASE("a plate that leaves the workspace aborts before the arm does, and the message names the limit") {
@@ -369,7 +370,7 @@ TEST_CASE(
     const char *seek, *stripes, *says;
   };
   const TooSmall plans[] = {
-      {"shots of the boundary", 900, "seek_limit_mm = 700", "max_stripes = 200", "outline not closed after"},
+      {"shots of the boundary", 1300, "seek_limit_mm = 700", "max_stripes = 200", "outline not closed after"},
       {"edge points", 1400, "seek_limit_mm = 9000", "max_stripes = 100", "outline not closed after"},
       {"shots of the surface", 500, "seek_limit_mm = 9000", "max_stripes = 200",
        "more shots than are planned for"},
