@@ -208,20 +208,10 @@ TEST_CASE(
     return ". What was measured is saved in " + folder.file(name) +
            " (overview.svg shows it); then begin a new run\n";
   };
-  ChildProcess off{{MOLDLOFT, "run", devices.config_with("centre_mm", "centre_mm = [510, 400, 15]"), "--out",
-                    folder.file("off")},
-                   PTY_MODEM};
-  CHECK(off.wait(run_limit) == firmware_like::exit_held);
-  CHECK(last_line(off.err()) ==
-        "moldloft: held: no plate under the scanner at x 510 y 400 mm: move [start] onto the plate" +
-            saved("off"));
-  CHECK(off.out().empty());
-  CHECK(stored_shots(folder.file("off")) == 1);
-
   ChildProcess beyond{
       {MOLDLOFT, "run", devices.config_with("y_mm", "y_mm = [-800, 50]"), "--out", folder.file("beyond")},
       PTY_MODEM};
-  CHECK(beyond.wait(run_limit) == firmware_like::exit_aborted);
+  CHECK_MESSAGE(beyond.wait(run_limit) == firmware_like::exit_aborted, beyond.err());
   CHECK(last_line(beyond.err()).starts_with("moldloft: aborted: target outside the workspace: y "));
   CHECK(last_line(beyond.err())
             .ends_with(" mm, limit -800.0 to 50.0 mm: move the plate, or widen [robot.workspace] if the arm "
@@ -229,6 +219,18 @@ TEST_CASE(
                        saved("beyond")));
   CHECK(beyond.out().empty());
   CHECK(stored_shots(folder.file("beyond")) > 1);
+
+  ChildProcess off{{MOLDLOFT, "run", devices.config_with("centre_mm", "centre_mm = [510, 400, 15]"), "--out",
+                    folder.file("off")},
+                   PTY_MODEM};
+  CHECK(off.wait(run_limit) == firmware_like::exit_held);
+  CHECK(last_line(off.err()) ==
+        "moldloft: held: no plate under the scanner at x 510 y 400 mm, looked for at 2 heights: move [start] "
+        "onto the "
+        "plate" +
+            saved("off"));
+  CHECK(off.out().empty());
+  CHECK(stored_shots(folder.file("off")) == 2);
 
   // Nothing was measured here: no folder, and not a line before the one that says why.
   const std::string never = folder.file("never");
