@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr std::size_t points_a_step = 64, bins_a_step = 512, feet_a_step = 1024;
+constexpr std::size_t points_a_step = 16, bins_a_step = 512, feet_a_step = 1024;
 constexpr std::size_t most_bins = 8192, most_runs = 128;
 constexpr double least_bin_mm = 2;  // edge points of one shot lie 1.4 mm apart
 constexpr int foot_iterations = 3;

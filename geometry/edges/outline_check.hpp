@@ -6,7 +6,7 @@
 // torn edge misses in many short places, a cut corner in one long one.
 //
 // Frame        plan view, mm; the outline counter-clockwise, so that its left is inside
-// Cost         of a point 0.3 us; step() does one bounded piece (64 points, or 512 bins of the boundary)
+// Cost         of a point 0.3 us; step() does one bounded piece (16 points, or 512 bins of the boundary)
 // Allocation   OutlineCheck in its constructor only; check_outline() is for reports and allocates
 // Failure      Error::capacity with more points than planned, not_finite, no_extent (a side without length)
 #pragma once

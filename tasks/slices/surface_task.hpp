@@ -93,7 +93,7 @@ class SurfaceTask final : public BackgroundTask {
   bool prepares() const { return stage_ == Stage::clearing || stage_ == Stage::folding_reserve; }
   bool outline_ready() const { return stage_ >= Stage::clearing && stage_ != Stage::failed; }
   geometry::Error error() const { return error_; }
-  const geometry::Outline& outline() const;
+  const geometry::Outline& outline() const MOLDLOFT_NONBLOCKING;
   // After Error::not_four_sided: what was found instead.
   const geometry::OutlineSearch& outline_search() const { return *outline_; }
   const geometry::SurfaceFit& fit() const { return fit_; }
