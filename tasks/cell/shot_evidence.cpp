@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 
-// Fixed-size Eigen throughout: what it keeps in local statics and function pointers hides from the compiler that nothing
-// here waits or allocates.
+// Fixed-size Eigen throughout: what it keeps in local statics and function pointers hides from the compiler that
+// nothing here waits or allocates.
 MOLDLOFT_CHECKED_AT_RUN_TIME
 
 namespace moldloft::tasks {
