@@ -77,3 +77,44 @@ TEST_CASE("a lie within the bounds is used as it is, and the plate stays within 
   CHECK(run.exit_code == firmware_like::exit_done);
   check_truth(run.summary);
 }
+
+TEST_CASE("somebody who moves the arm while it waits is noticed, and the shot is taken once more") {
+  ScriptedRun cell, undisturbed;
+  // Time enough at each place for somebody to move the arm and let go of it again.
+  for (auto* run : {&cell, &undisturbed}) run->options.cell.scanner_times.processing = 400ms;
+  cell.options.held = true;  // somebody is there
+  int told = 0;
+  std::string said;
+  bool pushed = false, mended = false;
+  const auto run = cell.run([&](const SimulatedCell& c, hal::Instant now) {
+    auto& controlled = c.controller.cell();
+    if (controlled.state() == tasks::CellState::held && controlled.cause() == tasks::HoldCause::person &&
+        (told == 0 || (pushed && !mended))) {
+      ++told;
+      mended = pushed;
+      if (pushed) said = controlled.why().view();
+      return controlled.command(tasks::CellEvent::unhold);
+    }
+    const auto& scanner = c.world.scanner();
+    if (!pushed && scanner.counters().exposures == 5 && now > c.world.robot().busy_until() + 20ms &&
+        now < scanner.busy_until() - 300ms) {
+      pushed = true;
+      hal::Pose beside = c.world.robot().drive().reported_pose(now);
+      beside.x_mm += 1.5;
+      c.world.robot().jog(beside, now);
+    }
+  });
+  CHECK(pushed);
+  CAPTURE(said);
+  CHECK(mended);
+  // It is asked while it still moves: 1.5 mm at the end, a little less then.
+  CHECK(said.find("the robot says it stands 1.") == 0);
+  CHECK(said.find(" mm and 0.00 degrees from where it said it stopped") != std::string::npos);
+  CHECK(run.exit_code == firmware_like::exit_done);
+  check_truth(run.summary);
+  // The place is driven to once more, and exposed once more.
+  const auto plain = undisturbed.run();
+  CHECK(cell.motions == undisturbed.motions + 1);
+  CHECK(cell.exposures == undisturbed.exposures + 1);
+  CHECK(run.summary["shots"]["boundary"] == plain.summary["shots"]["boundary"]);
+}
