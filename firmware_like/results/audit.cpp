@@ -23,6 +23,10 @@ constexpr double degrees = 180 / std::numbers::pi;
 
 // An outline that is wrong by no more than this is a matter of the rim; beyond it the plate has another shape.
 constexpr double smooth_rim_mm = 2;
+// Edge points that miss over less than this are single false points; a corner of radius 3 mm misses over twice as much.
+constexpr double shortest_miss_mm = 1.5;
+// So near to a corner, edge points that lie farther inside than this are those of a corner that is not sharp.
+constexpr double corner_reach_mm = 3, blunt_mm = 0.4;
 // Parts of the plate without points, smaller than this in all, are what a tack or a scratch hides.
 constexpr double smallest_unseen_mm2 = 16;
 // A surface that leaves its points by less is what the points themselves scatter.
@@ -40,6 +44,8 @@ constexpr double most_noise = 1.5, least_noise = 0.5;
 // In 192 runs on good plates the rms of so many shots stayed below 1.45 times what the arm promises.
 constexpr std::size_t few_shots = 10;
 constexpr double most_repeatability = 1.6;
+// With more than this share of all shots against the others, the others are no better.
+constexpr double most_in_height = 1.0 / 3, most_aside = 1.0 / 4;
 // A model explains the shots' disagreement when it takes away so much of its square.
 constexpr double explains = 0.4;
 
@@ -90,6 +96,7 @@ class Audit {
   }
 
   void check_edge_points();
+  std::vector<Finding> blunt_corners() const;
   void check_planned_shots();
   void check_sight();
   void check_swings(const std::vector<UnseenPart>&);
@@ -109,13 +116,21 @@ class Audit {
   std::vector<SeenEdge> edges_;
   std::vector<ShotAgreement> shots_;
   std::vector<Finding> found_;
+  int apart_ = 0;  // places where edge points lie beside the outline and others on it
 };
 
 void Audit::check_edge_points() {
   using Kind = geometry::OutlineDeviation::Kind;
-  const auto deviations = geometry::check_outline(plate_.outline, r_.track.edge_points,
-                                                  {.limit_mm = geometry::outline_limit_mm(edge_sigma_mm)});
-  if (!deviations) return;
+  const auto deviations = geometry::check_outline(
+      plate_.outline, r_.track.edge_points,
+      {.limit_mm = geometry::outline_limit_mm(edge_sigma_mm), .min_length_mm = shortest_miss_mm});
+  if (!deviations)
+    return add(
+        {.kind = FindingKind::outline,
+         .gravity = Gravity::untrusted,
+         .place = {},
+         .text = "the outline cannot be compared with the edge points that were seen: keep the run's folder "
+                 "and report it"});
   // Where most of the rim is ragged, a corner that is off by as much is another tooth.
   double ragged_length = 0, teeth = 0;
   for (const auto& d : *deviations) {
@@ -129,7 +144,8 @@ void Audit::check_edge_points() {
   std::optional<std::size_t> shape;  // of those, the farthest that is no matter of the rim
   for (const auto& d : *deviations) {
     const bool rim = d.kind == Kind::ragged || d.kind == Kind::apart || d.kind == Kind::unseen;
-    const double size = d.kind == Kind::unseen ? d.length_mm : d.distance_mm();
+    const double size = d.kind == Kind::unseen ? d.length_mm : d.farthest_mm();
+    if (d.kind == Kind::apart && size > smooth_rim_mm) ++apart_;
     const bool other_shape = !rim && size > other_shape_mm;
     if (other_shape && (!shape || size > named[*shape].size_mm)) shape = named.size();
     named.push_back({.kind = d.kind == Kind::ragged ? FindingKind::ragged_rim : FindingKind::outline,
@@ -143,6 +159,33 @@ void Audit::check_edge_points() {
         "the plate has not four smooth sides that meet in four corners: {}; its outline cannot be told",
         named[*shape].text);
   add_named(std::move(named), "places");
+  for (Finding& corner : blunt_corners()) add(std::move(corner));
+}
+
+// A corner that is rounded by a few millimetres moves two or three edge points only, too few for a stretch that misses.
+std::vector<Finding> Audit::blunt_corners() const {
+  std::vector<Finding> blunt;
+  for (const Eigen::Vector2d& corner : plate_.outline.corners) {
+    const bool is_named = std::ranges::any_of(
+        found_, [&](const Finding& f) { return f.place && (*f.place - corner).norm() < corner_reach_mm; });
+    double deepest = 0;
+    int inside = 0;
+    for (const Eigen::Vector2d& p : r_.track.edge_points) {
+      if ((p - corner).norm() > corner_reach_mm) continue;
+      const double inwards = -outline_.locate(p).distance_mm;
+      if (inwards > blunt_mm / 2) ++inside;
+      deepest = std::max(deepest, inwards);
+    }
+    if (is_named || inside < 2 || deepest < blunt_mm) continue;
+    blunt.push_back(
+        {.kind = FindingKind::outline,
+         .place = corner,
+         .size_mm = deepest,
+         .text = fmt::format("the corner at {} is blunt: edge points beside it lie {:.1f} mm inside; it is "
+                             "known to {:.0f} mm only",
+                             place_text(corner), deepest, corner_reach_mm)});
+  }
+  return blunt;
 }
 
 // Every place of the zig-zag was seen, at the first time or when it was taken again.
@@ -309,6 +352,20 @@ void Audit::check_agreement() {
       std::max(highest ? std::abs(highest->height_mm) : 0.0, farthest ? std::abs(farthest->aside_mm) : 0.0);
   if (cause.explained > explains && (highest != nullptr || farthest != nullptr))
     return say_cause(cause, worst);
+  const auto share = [&](int count) {
+    return static_cast<double>(count) / static_cast<double>(shots_.size());
+  };
+  // A rim that is torn puts edges aside too, but then those who look at the same place see the same.
+  const bool edges_contradict = apart_ > 1 && share(aside) > most_aside;
+  if (share(in_height) > most_in_height || edges_contradict)
+    add({.kind = FindingKind::shot_edges,
+         .gravity = Gravity::untrusted,
+         .place = {},
+         .size_mm = worst,
+         .text = fmt::format(
+             "{} of {} shots contradict the others, by up to {:.1f} mm: check [scanner.mount], and "
+             "that neither plate nor scanner nor arm gives way",
+             std::max(in_height, aside), shots_.size(), worst)});
   if (highest != nullptr)
     add({.kind = FindingKind::shot_heights,
          .place = seen(*highest).place.centre.head<2>(),

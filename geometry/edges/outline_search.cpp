@@ -184,6 +184,11 @@ std::expected<bool, Error> OutlineSearch::check_done() {
     named_count_ = check_.deviations().size();
     std::ranges::copy(check_.deviations(), named_.begin());
   }
+  // Leaving teeth out would leave most of the edge out.
+  if (attempt_ == 0 && is_torn_all_round()) {
+    stage_ = Stage::done;
+    return true;
+  }
   if (miss.places == 0 || (attempt_ > 1 && is_same && is_clear(deviations()) && is_trusted())) {
     stage_ = Stage::done;
     return true;
@@ -314,7 +319,17 @@ std::expected<bool, Error> OutlineSearch::next_scale() {
   return true;
 }
 
+// Teeth along more than half of the boundary: how far a corner is off says nothing of the plate's shape.
+bool OutlineSearch::is_torn_all_round() const {
+  double torn = 0, around = 0;
+  for (const OutlineDeviation& d : deviations())
+    torn += d.kind == OutlineDeviation::Kind::ragged ? d.length_mm : 0;
+  for (std::size_t i = 0; i < 4; ++i) around += (best_.corners[(i + 1) % 4] - best_.corners[i]).norm();
+  return torn > around / 2;
+}
+
 bool OutlineSearch::is_trusted() const {
+  if (has_outline_ && is_torn_all_round()) return true;
   return has_outline_ && std::ranges::all_of(deviations(), [&](const OutlineDeviation& d) {
            return weight_of(d) <= settings_.hold_mm;
          });

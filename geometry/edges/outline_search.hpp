@@ -88,6 +88,7 @@ class OutlineSearch {
   std::expected<bool, Error> next_scale();
   void next_attempt();
   void repair();
+  bool is_torn_all_round() const;
   bool is_trusted() const;
   bool has_fewer_corners() const;
   double weight_of(const OutlineDeviation&) const;

@@ -63,7 +63,8 @@ Measurement::Measurement(const CellSettings& settings, Supervisor& supervisor, S
       view_{settings.max_stripes, settings.max_points, settings.view},
       evidence_{
           {.max_shots = static_cast<std::size_t>(settings.tracker.max_shots) + 1 + settings.max_surface_shots,
-           .depth_mm = settings.depth_mm}},
+           .max_stripes = settings.max_stripes,
+           .max_points = settings.max_points}},
       surface_places_(settings.max_surface_shots),
       time_left_{settings.tracker, settings.scan} {
   boundary_places_.reserve(static_cast<std::size_t>(settings.tracker.max_shots) + 1);

@@ -13,9 +13,6 @@ MOLDLOFT_CHECKED_AT_RUN_TIME
 namespace moldloft::tasks {
 namespace {
 
-constexpr std::uint16_t stripe_stride = 3;  // of the runs that are kept
-constexpr std::uint32_t sample_stride = 24;
-
 template <typename T>
 std::span<const T> part(const std::vector<T>& all, std::size_t begin, std::size_t end) {
   return std::span{all}.subspan(begin, end - begin);
@@ -31,7 +28,11 @@ std::span<const Eigen::Vector3d> RunEvidence::samples_of(std::size_t shot) const
   return part(samples, shot == 0 ? 0 : shots[shot - 1].samples_end, shots[shot].samples_end);
 }
 
-EvidenceBook::EvidenceBook(const Settings& settings) : settings_{settings} {
+EvidenceBook::EvidenceBook(const Settings& settings)
+    : stripe_stride_{static_cast<std::uint16_t>((settings.max_stripes + stripes_a_shot - 1) /
+                                                stripes_a_shot)},
+      sample_stride_{static_cast<std::uint32_t>(
+          std::max(1.0, std::ceil(std::sqrt(static_cast<double>(settings.max_points) / samples_a_shot))))} {
   kept_.shots.reserve(settings.max_shots);
   kept_.runs.reserve(settings.max_shots * runs_a_shot);
   kept_.samples.reserve(settings.max_shots * samples_a_shot);
@@ -56,7 +57,7 @@ RunEdge EvidenceBook::edge_at(geometry::RunEnd end) {
 void EvidenceBook::add_runs(const geometry::RigidMotion& world_from_scanner, const ShotView& view) {
   std::size_t left = runs_a_shot;
   for (const geometry::PlateRun& run : view.runs()) {
-    if (run.stripe % stripe_stride != 0) continue;
+    if (run.stripe % stripe_stride_ != 0) continue;
     if (left-- == 0) return;
     const Eigen::Vector3d first = view.first_of(run), last = view.last_of(run);
     hal::add_within_reserve(kept_.runs, SeenRun{.first = world_from_scanner * first,
@@ -71,7 +72,7 @@ void EvidenceBook::add(const ShotSeen& shot, ShotView& view, std::size_t edge_po
   if (shot.plate_found) {
     add_runs(shot.world_from_scanner, view);
     std::array<Eigen::Vector3d, samples_a_shot> points;
-    view.rewind(sample_stride);
+    view.rewind(sample_stride_);
     const std::size_t count = view.next(points);
     for (std::size_t i = 0; i < count; ++i)
       hal::add_within_reserve(kept_.samples, shot.world_from_scanner * points[i]);

@@ -1,5 +1,5 @@
 // What every shot of a run showed, thinned: enough to ask afterwards whether the result can be true. Of each shot its
-// place and pose, whether the plate was found, every third stripe's runs with their ends, and a lattice of points.
+// place and pose, whether the plate was found, the runs of some forty stripes with their ends, and a lattice of points.
 //
 // Kept by the cell while it measures: the shot before knows best how high the plate lies where the next one looks. The
 // audit reads a copy (firmware_like/results/audit.hpp).
@@ -7,7 +7,7 @@
 // Frame        world, mm
 // Thread       the control thread; a copy may be read by anybody
 // Cost         add() about 10 us; known_near() 5 us
-// Memory       9 kB a shot, all of it allocated in the constructor
+// Memory       7 kB a shot, all of it allocated in the constructor
 // Failure      a shot beyond the memory plan is not kept; the cell gives up before
 #pragma once
 
@@ -60,7 +60,8 @@ class EvidenceBook {
  public:
   struct Settings {
     std::size_t max_shots = 0;
-    double depth_mm = 60;  // heights are measured within this, to each side of the field's centre
+    std::size_t max_stripes = 100,
+                max_points = 50'000;  // of a frame: how much it is thinned follows from them
   };
   explicit EvidenceBook(const Settings&);
 
@@ -81,11 +82,12 @@ class EvidenceBook {
   std::size_t bytes() const;
 
  private:
-  static constexpr std::size_t runs_a_shot = 48, samples_a_shot = 128;
+  static constexpr std::size_t stripes_a_shot = 40, runs_a_shot = 64, samples_a_shot = 128;
   void add_runs(const geometry::RigidMotion& world_from_scanner, const ShotView&) MOLDLOFT_NONBLOCKING;
   static RunEdge edge_at(geometry::RunEnd) MOLDLOFT_NONBLOCKING;
 
-  Settings settings_;
+  std::uint16_t stripe_stride_;  // of the stripes whose runs are kept
+  std::uint32_t sample_stride_;  // of stripes and points in the lattice
   RunEvidence kept_;
 };
 
