@@ -3,6 +3,7 @@
 
 #include "geometry/nonblocking.hpp"
 
+#include <cstddef>
 #include <string_view>
 
 namespace moldloft::geometry {
@@ -57,5 +58,13 @@ enum class Error {
 };
 
 std::string_view to_string(Error) noexcept MOLDLOFT_GEOMETRY_NONBLOCKING;
+
+// What is wrong with data, and where: the number of the point, knot, cell, curve or coefficient that the error speaks
+// of. The function's header says which.
+struct Flaw {
+  Error error{};
+  std::size_t where = 0;
+  bool operator==(const Flaw&) const = default;
+};
 
 }  // namespace moldloft::geometry

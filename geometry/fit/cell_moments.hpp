@@ -62,6 +62,7 @@ class MomentGrid {
   CellMoments* cells() { return cells_.data(); }
   const CellMoments* cells() const { return cells_.data(); }
   std::uint32_t* counts() { return counts_.data(); }
+  const std::uint32_t* counts() const { return counts_.data(); }
   int cell_count() const { return cells_u_ * cells_v_; }
   void clear(int first, int end);  // of the cells, row after row
   void clear() { clear(0, cell_count()); }

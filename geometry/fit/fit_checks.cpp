@@ -16,11 +16,11 @@ constexpr double least_extent = 1e-9;
 // Squared thickness of points on one line, relative to the domain's square: what rounding leaves of the sums.
 constexpr double no_thickness = 1e-14;
 
-std::unexpected<FitFailure> failed(Error error, std::size_t where = 0) {
-  return std::unexpected(FitFailure{error, where});
+std::unexpected<Flaw> failed(Error error, std::size_t where = 0) {
+  return std::unexpected(Flaw{error, where});
 }
 
-std::expected<void, FitFailure> check_domain(const FitDomain& d) {
+std::expected<void, Flaw> check_domain(const FitDomain& d) {
   if (!std::isfinite(d.min_u) || !std::isfinite(d.max_u) || !std::isfinite(d.min_v) ||
       !std::isfinite(d.max_v))
     return failed(Error::not_finite);
@@ -32,8 +32,8 @@ std::expected<void, FitFailure> check_domain(const FitDomain& d) {
   return {};
 }
 
-std::expected<void, FitFailure> check_boundary(const FitSettings& settings, Eigen::Index control_u,
-                                               Eigen::Index control_v, bool chosen) {
+std::expected<void, Flaw> check_boundary(const FitSettings& settings, Eigen::Index control_u,
+                                         Eigen::Index control_v, bool chosen) {
   const Eigen::MatrixXd& control = settings.boundary.control;
   if (control.size() == 0) return {};
   if (chosen) return failed(Error::impossible_setting);
@@ -51,7 +51,7 @@ std::expected<void, FitFailure> check_boundary(const FitSettings& settings, Eige
 
 }  // namespace
 
-std::expected<void, FitFailure> check_settings(const FitSettings& settings) {
+std::expected<void, Flaw> check_settings(const FitSettings& settings) {
   const FairingSettings& fairing = settings.fairing;
   if (!(settings.tolerance >= 0) || !(fairing.everywhere >= 0) || !(fairing.where_sparse >= 0) ||
       !std::isfinite(fairing.everywhere) || !std::isfinite(fairing.where_sparse) ||
@@ -80,8 +80,7 @@ std::expected<void, FitFailure> check_settings(const FitSettings& settings) {
   return check_boundary(settings, control_u, control_v, chosen);
 }
 
-std::expected<void, FitFailure> check_sums(const PointColumns& columns, const PointTotals& totals,
-                                           double datum) {
+std::expected<void, Flaw> check_sums(const PointColumns& columns, const PointTotals& totals, double datum) {
   if (std::isfinite(totals.squares) && std::isfinite(totals.weight)) return {};
   // The datum is one of the points' heights: where that one is the large one, it is the one to blame.
   std::size_t worst = 0;
@@ -95,7 +94,7 @@ std::expected<void, FitFailure> check_sums(const PointColumns& columns, const Po
   return failed(Error::too_large, worst);
 }
 
-std::expected<void, FitFailure> check_spread(const SplineNet& net, const MomentGrid& grid) {
+std::expected<void, Flaw> check_spread(const SplineNet& net, const MomentGrid& grid) {
   const SpanTable &u = net.spans_u(), &v = net.spans_v();
   const double first_u = u[0].begin, length_u = u[u.spans() - 1].end - first_u;
   const double first_v = v[0].begin, length_v = v[v.spans() - 1].end - first_v;

@@ -12,18 +12,16 @@
 
 namespace moldloft::geometry {
 
-constexpr int fewest_spans = 4;  // of a net to choose from
-
 // The finest grid of moments, at 0.6 kB a cell: what is larger is a slip of the caller's.
 constexpr int most_cells = 1 << 20;
 
-std::expected<void, FitFailure> check_settings(const FitSettings&);
+std::expected<void, Flaw> check_settings(const FitSettings&);
 
 // The squares of all heights above the datum must add up to a number.
-std::expected<void, FitFailure> check_sums(const PointColumns&, const PointTotals&, double datum);
+std::expected<void, Flaw> check_sums(const PointColumns&, const PointTotals&, double datum);
 
 // Points in one place or on one line leave the plane through them open, and fairing does not close it. `net` has
 // the grid's cells.
-std::expected<void, FitFailure> check_spread(const SplineNet& net, const MomentGrid&);
+std::expected<void, Flaw> check_spread(const SplineNet& net, const MomentGrid&);
 
 }  // namespace moldloft::geometry

@@ -1,9 +1,9 @@
 #include "geometry/fit/fit_surface.hpp"
 
 #include "geometry/fit/fit_checks.hpp"
+#include "geometry/fit/net_search.hpp"
 #include "geometry/fit/robust_weights.hpp"
 #include "geometry/splines/band_condition.hpp"
-#include "geometry/tukey.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,84 +12,57 @@ namespace moldloft::geometry {
 
 namespace {
 
-// A net is tried when it has at least this many points for every unknown.
-constexpr double points_an_unknown = 4;
+// Nets between the best one and its neighbours, of half and twice its spans, have these shares of its spans.
+constexpr double shares_between[] = {0.75, 0.875, 1.25, 1.5};
+
+// Reweighting rests when neither the coefficients nor the scale move by more than this share of the scale.
+constexpr double robust_rest = 0.01;
+
+// Heights that are met to this share of their size have no spread to weigh them by.
+constexpr double rounding_share = 1e-14;
 
 bool chooses(const FitSettings& settings) {
   return settings.control_u == 0 && settings.control_v == 0 && settings.knots_u.empty();
 }
 
-std::vector<double> stretched(int spans, double begin, double end) {
-  std::vector<double> knots = uniform_clamped_knots(spans);
-  for (double& knot : knots) knot = knot == 1 ? end : begin + knot * (end - begin);
-  return knots;
+SplineNet finest_net(const FitSettings& settings, const MomentGrid& grid) {
+  // Over a domain the net lives on [0, 1]: only differences of knots matter to it.
+  return settings.knots_u.empty() ? SplineNet(grid.cells_u(), grid.cells_v())
+                                  : SplineNet(settings.knots_u, settings.knots_v);
 }
 
-// One net over the same points: its cells' moments and its equations.
-struct Candidate {
-  SplineNet net;
-  std::vector<double> knots_u, knots_v;   // of the surface; the net may live on [0, 1]
-  std::optional<MomentGrid> merged = {};  // nothing: the points' own cells
-  std::vector<double> coefficients = {};
-  NetResult result = {};
-};
-
-Candidate candidate(const FitSettings& settings, int spans_u, int spans_v) {
-  if (!settings.knots_u.empty()) {
-    return {SplineNet(settings.knots_u, settings.knots_v), settings.knots_u, settings.knots_v};
-  }
-  const FitDomain& d = settings.domain;
-  auto knots_u = stretched(spans_u, d.min_u, d.max_u), knots_v = stretched(spans_v, d.min_v, d.max_v);
-  // The net lives on [0, 1]: only differences of knots matter to it.
-  return {SplineNet(spans_u, spans_v), std::move(knots_u), std::move(knots_v)};
+NetSearchSettings search_settings(const FitSettings& settings) {
+  const bool fair = settings.fairing.everywhere > 0 || settings.fairing.where_sparse > 0;
+  return {.nested = chooses(settings),
+          .points_an_unknown = chooses(settings) ? points_an_unknown
+                               : fair            ? 0.0
+                                                 : 1.0,
+          .criterion = settings.criterion,
+          .tolerance = settings.tolerance,
+          .norm = settings.condition};
 }
 
-NetTask task_for(const Candidate& candidate, const MomentGrid& moments, const FitSettings& settings,
-                 const PointTotals& totals, std::span<const double> boundary) {
-  NetTask task;
-  task.net = &candidate.net, task.moments = &moments, task.totals = totals;
+NetTask model_of(const FitSettings& settings, const PointTotals& totals, std::span<const double> boundary) {
+  NetTask model;
+  model.totals = totals;
   // Over given knots the integrals are in the columns' own unit.
   if (settings.knots_u.empty()) {
-    task.length_u_mm = settings.domain.max_u - settings.domain.min_u;
-    task.length_v_mm = settings.domain.max_v - settings.domain.min_v;
+    model.length_u_mm = settings.domain.max_u - settings.domain.min_u;
+    model.length_v_mm = settings.domain.max_v - settings.domain.min_v;
   }
-  task.fairing = settings.fairing.everywhere;
-  task.sparse_fairing = settings.fairing.where_sparse;
-  task.sparse_points = std::max(1u, settings.fairing.sparse_points);
-  task.boundary = boundary, task.boundary_weight = settings.boundary.weight;
-  return task;
+  model.fairing = settings.fairing.everywhere;
+  model.sparse_fairing = settings.fairing.where_sparse;
+  model.sparse_points = std::max(1u, settings.fairing.sparse_points);
+  model.boundary = boundary, model.boundary_weight = settings.boundary.weight;
+  return model;
 }
 
-std::size_t first_empty_cell(const MomentGrid& grid) {
-  for (int i = 0; i < grid.cells_u(); ++i) {
-    for (int j = 0; j < grid.cells_v(); ++j) {
-      if (grid.points(i, j) == 0) return static_cast<std::size_t>(i) * grid.cells_v() + j;
-    }
-  }
-  return static_cast<std::size_t>(grid.cells_u()) * grid.cells_v();
-}
-
-// The control point (row, column) of an unknown.
-std::pair<int, int> control_of(const SplineNet& net, int unknown) {
-  const int fast = net.v_is_fast() ? net.control_v() : net.control_u();
-  return net.v_is_fast() ? std::pair(unknown / fast, unknown % fast)
-                         : std::pair(unknown % fast, unknown / fast);
-}
-
-FittedSurface assemble(const Candidate& chosen, double datum) {
-  FittedSurface out;
-  const SplineNet& net = chosen.net;
-  BSplineSurface& s = out.surface;
-  s.knots_u = chosen.knots_u, s.knots_v = chosen.knots_v;
-  s.x.resize(net.control_u(), net.control_v());
-  s.y = s.z = s.x;
-  for (int i = 0; i < net.control_u(); ++i) {
-    for (int j = 0; j < net.control_v(); ++j) {
-      s.x(i, j) = greville(s.knots_u, i), s.y(i, j) = greville(s.knots_v, j);
-      s.z(i, j) = chosen.coefficients[net.index(i, j)] + datum;
-    }
-  }
-  return out;
+// Of a net on [0, 1] whose inner knots are simple, stretched to [begin, end].
+std::vector<double> stretched_knots(const SpanTable& spans, double begin, double end) {
+  std::vector<double> knots(cubic + 1, begin);
+  for (int k = 1; k < spans.spans(); ++k) knots.push_back(begin + spans[k].begin * (end - begin));
+  knots.insert(knots.end(), cubic + 1, end);
+  return knots;
 }
 
 // Where `spans` nearly equal spans begin and end on a grid of `cells`.
@@ -106,45 +79,36 @@ std::vector<double> knots_at(const std::vector<int>& bounds) {
   return knots;
 }
 
-// All nets of one fit, and room for the largest of their systems.
+// The search over one set of moments, stepped until done, and the surface that it found.
 class Fitter {
  public:
   Fitter(const FitSettings& settings, const MomentAccumulator& finest)
-      : settings_(settings), finest_(finest) {
-    candidates_.push_back(candidate(settings, finest.grid().cells_u(), finest.grid().cells_v()));
-    spread_ = check_spread(candidates_.front().net, finest.grid());
-  }
+      : settings_(settings),
+        finest_(finest),
+        totals_(finest.totals()),
+        search_(finest_net(settings, finest.grid()), search_settings(settings),
+                static_cast<double>(totals_.points)) {}
 
-  std::expected<void, FitFailure> run() {
-    totals_ = finest_.totals();
-    const bool fair = settings_.fairing.everywhere > 0 || settings_.fairing.where_sparse > 0;
-    const double needed = chooses(settings_) ? points_an_unknown : fair ? 0 : 1;
-    const auto determined = [&](const Candidate& c) {
-      return static_cast<double>(totals_.points) >= needed * c.net.unknowns();
-    };
-    if (chooses(settings_)) halve_down();
-    std::erase_if(candidates_, [&](const Candidate& c) { return !determined(c); });
-    if (candidates_.empty() || totals_.points == 0) {
-      return std::unexpected(FitFailure{Error::too_few_points, totals_.points});
-    }
-    if (!(totals_.weight > 0)) return std::unexpected(FitFailure{Error::too_few_points, totals_.points});
+  std::expected<void, Flaw> run() {
     set_boundary();
+    const NetTask model = model_of(settings_, totals_, boundary_);
+    if (const auto good = search_.start(finest_.grid(), model); !good) return good;
     if (boundary_.empty()) {
-      if (const auto good = spread_; !good) return good;
+      const auto good = check_spread(search_.candidates().front().net, finest_.grid());
+      if (!good) return good;
     }
-    for (Candidate& c : candidates_) {
-      if (const auto good = solve(c); !good) return good;
-    }
-    chosen_ = choose();
+    if (const auto good = search_.finish(); !good) return good;
     if (chooses(settings_)) {
       if (const auto good = try_between(); !good) return good;
     }
-    // The solver holds the factor of the net that came last, whichever was chosen.
-    if (settings_.condition && candidates_.size() > 1) return solve(candidates_[chosen_]);
+    if (settings_.condition && search_.scores().size() > 1) {
+      search_.solve_again();
+      return search_.finish();
+    }
     return {};
   }
 
-  const Candidate& chosen() const { return candidates_[chosen_]; }
+  const NetCandidate& chosen() const { return search_.chosen(); }
   // Whether the choice is none of the nested, evenly spaced nets.
   bool chose_between() const {
     const auto whole_share = [](int finest, int spans) { return finest % spans == 0; };
@@ -153,51 +117,33 @@ class Fitter {
   }
 
   FittedSurface result() const {
-    FittedSurface out = assemble(chosen(), finest_.datum());
+    FittedSurface out{.surface = surface(), .report = {}};
     const NetResult& result = chosen().result;
+    const NetScore& score = search_.score();
     FitReport& report = out.report;
     report.totals = totals_;
-    report.rms_residual = std::sqrt(result.squares / totals_.weight);
-    report.sigma = score(chosen()).sigma;
+    report.rms_residual = score.rms_residual, report.sigma = score.sigma;
     report.empty_cells = result.empty_cells, report.sparse_cells = result.sparse_cells;
     report.smallest_pivot = result.smallest_pivot;
     std::tie(report.smallest_pivot_i, report.smallest_pivot_j) =
         control_of(chosen().net, result.smallest_pivot_unknown);
     if (settings_.condition)
-      report.condition = solver_->norm_one() * estimated_inverse_norm(solver_->factor());
-    for (const Candidate& c : candidates_) report.nets.push_back(score(c));
-    report.chosen = chosen_;
+      report.condition = search_.solver().norm_one() * estimated_inverse_norm(search_.solver().factor());
+    report.nets.assign(search_.scores().begin(), search_.scores().end());
+    report.chosen = search_.chosen_score();
     report.freedom = result.freedom;
-    report.bytes = finest_.bytes() + solver_->bytes() + sizeof(PointBlock);
-    for (const Candidate& c : candidates_) {
-      report.bytes += c.net.bytes() + c.coefficients.capacity() * sizeof(double);
-      if (c.merged) report.bytes += c.merged->bytes();
-    }
-    report.bytes += 3 * static_cast<std::size_t>(out.surface.z.size()) * sizeof(double);
+    report.bytes = finest_.bytes() + search_.bytes() + sizeof(PointBlock) +
+                   3 * static_cast<std::size_t>(out.surface.z.size()) * sizeof(double);
     return out;
   }
 
  private:
-  const MomentGrid& grid(const Candidate& c) const { return c.merged ? *c.merged : finest_.grid(); }
-
-  void halve_down() {
-    int u = finest_.grid().cells_u(), v = finest_.grid().cells_v();
-    while (u > fewest_spans || v > fewest_spans) {
-      u = std::max(u / 2, fewest_spans), v = std::max(v / 2, fewest_spans);
-      Candidate c = candidate(settings_, u, v);
-      c.merged.emplace(u, v);
-      c.merged->merge_cells(0, u * v, grid(candidates_.back()));
-      candidates_.push_back(std::move(c));
-    }
-  }
-
-  // Between the best net and its neighbours, of half and twice its spans, lie others whose knots are knots
-  // of the finest grid too, only not quite evenly spaced; their moments follow from the same sums.
-  std::expected<void, FitFailure> try_between() {
-    const FitDomain& d = settings_.domain;
-    const int u = candidates_[chosen_].net.cells_u(), v = candidates_[chosen_].net.cells_v();
+  // Between the best net and its neighbours lie others whose knots are knots of the finest grid too, only not quite
+  // evenly spaced; their moments follow from the same sums.
+  std::expected<void, Flaw> try_between() {
+    const int u = chosen().net.cells_u(), v = chosen().net.cells_v();
     const MomentGrid& finest = finest_.grid();
-    for (const double share : {0.75, 0.875, 1.25, 1.5}) {
+    for (const double share : shares_between) {
       const int spans_u = static_cast<int>(share * u), spans_v = static_cast<int>(share * v);
       if (std::min(spans_u, spans_v) < fewest_spans || spans_u > finest.cells_u() / 2 ||
           spans_v > finest.cells_v() / 2) {
@@ -205,167 +151,59 @@ class Fitter {
       }
       const std::vector<int> at_u = nearly_equal(finest.cells_u(), spans_u),
                              at_v = nearly_equal(finest.cells_v(), spans_v);
-      std::vector<double> knots_u = knots_at(at_u), knots_v = knots_at(at_v);
-      SplineNet net(knots_u, knots_v);
+      SplineNet net(knots_at(at_u), knots_at(at_v));
       if (static_cast<double>(totals_.points) < points_an_unknown * net.unknowns()) continue;
-      for (double& knot : knots_u) knot = knot == 1 ? d.max_u : d.min_u + knot * (d.max_u - d.min_u);
-      for (double& knot : knots_v) knot = knot == 1 ? d.max_v : d.min_v + knot * (d.max_v - d.min_v);
-      Candidate c{std::move(net), std::move(knots_u), std::move(knots_v)};
-      c.merged.emplace(spans_u, spans_v);
-      c.merged->merge_blocks(finest, at_u, at_v);
-      if (const auto good = solve(c); !good) return good;
-      const auto coarser = std::ranges::find_if(
-          candidates_, [&](const Candidate& other) { return other.net.unknowns() < c.net.unknowns(); });
-      candidates_.insert(coarser, std::move(c));
+      search_.also_try(std::move(net), at_u, at_v);
+      if (const auto good = search_.finish(); !good) return good;
     }
-    chosen_ = choose();
     return {};
   }
 
-  NetScore score(const Candidate& c) const {
-    const double n = static_cast<double>(totals_.points);
-    return {.spans_u = c.net.cells_u(),
-            .spans_v = c.net.cells_v(),
-            .gcv = generalized_cross_validation(totals_, c.result),
-            .bic = bayesian_information(totals_, c.result),
-            .sigma = std::sqrt(c.result.squares / std::max(1.0, n - c.result.freedom)),
-            .smallest_pivot = c.result.smallest_pivot,
-            .empty_cells = c.result.empty_cells};
-  }
-
-  std::size_t choose() const {
-    std::vector<NetScore> scores;
-    for (const Candidate& c : candidates_) scores.push_back(score(c));
-    return choose_net(scores, settings_.criterion, settings_.tolerance);
-  }
-
   void set_boundary() {
-    boundary_.clear();
     const Eigen::MatrixXd& given = settings_.boundary.control;
     if (given.size() == 0) return;
-    const SplineNet& net = candidates_.front().net;
+    const SplineNet& net = search_.candidates().front().net;
     boundary_.resize(static_cast<std::size_t>(net.unknowns()));
     for (int i = 0; i < net.control_u(); ++i) {
       for (int j = 0; j < net.control_v(); ++j) boundary_[net.index(i, j)] = given(i, j) - finest_.datum();
     }
   }
 
-  std::expected<void, FitFailure> solve(Candidate& c) {
-    if (settings_.fairing.everywhere <= 0 && settings_.fairing.where_sparse <= 0) {
-      const std::size_t empty = first_empty_cell(grid(c));
-      if (empty < static_cast<std::size_t>(c.net.cells_u()) * c.net.cells_v()) {
-        return std::unexpected(FitFailure{Error::empty_cells, empty});
+  BSplineSurface surface() const {
+    const SplineNet& net = chosen().net;
+    const FitDomain& d = settings_.domain;
+    BSplineSurface s;
+    const bool given = !settings_.knots_u.empty();
+    s.knots_u = given ? settings_.knots_u : stretched_knots(net.spans_u(), d.min_u, d.max_u);
+    s.knots_v = given ? settings_.knots_v : stretched_knots(net.spans_v(), d.min_v, d.max_v);
+    s.x.resize(net.control_u(), net.control_v());
+    s.y = s.z = s.x;
+    for (int i = 0; i < net.control_u(); ++i) {
+      for (int j = 0; j < net.control_v(); ++j) {
+        s.x(i, j) = greville(s.knots_u, i), s.y(i, j) = greville(s.knots_v, j);
       }
     }
-    // The nets between are larger than the nested ones that the points determined.
-    if (!solver_ || !solver_->holds(c.net)) {
-      solver_.emplace(c.net.unknowns(), c.net.half_band());
-      solver_->want_norm(settings_.condition);
-    }
-    solver_->start(task_for(c, grid(c), settings_, totals_, boundary_), nullptr);
-    if (const auto solved = solver_->solve(); !solved) {
-      const int at = solver_->singular_unknown() >= 0 ? solver_->singular_unknown()
-                                                      : solver_->factor().smallest_column();
-      const auto [i, j] = control_of(c.net, at);
-      return std::unexpected(FitFailure{solved.error(), static_cast<std::size_t>(i) * c.net.control_v() + j});
-    }
-    c.result = solver_->result();
-    c.coefficients.assign(solver_->coefficients().begin(), solver_->coefficients().end());
-    return {};
+    chosen().heights_into(s.z, finest_.datum());
+    return s;
   }
 
   const FitSettings& settings_;
   const MomentAccumulator& finest_;
-  std::vector<Candidate> candidates_;  // from fine to coarse
-  std::optional<NetSolver> solver_;    // has held every net that was solved
-  std::expected<void, FitFailure> spread_;
-  std::vector<double> boundary_;
   PointTotals totals_;
-  std::size_t chosen_ = 0;
+  NetSearch search_;
+  std::vector<double> boundary_;
 };
 
-// Reweighting rests when neither the coefficients nor the scale move by more than this share of the scale.
-constexpr double robust_rest = 0.01;
-
-double difference(const Candidate& a, const Candidate& b) {
-  if (a.coefficients.size() != b.coefficients.size()) return std::numeric_limits<double>::infinity();
+double difference(std::span<const double> a, std::span<const double> b) {
+  if (a.size() != b.size()) return std::numeric_limits<double>::infinity();
   double worst = 0;
-  for (std::size_t k = 0; k < a.coefficients.size(); ++k) {
-    worst = std::max(worst, std::abs(a.coefficients[k] - b.coefficients[k]));
-  }
+  for (std::size_t k = 0; k < a.size(); ++k) worst = std::max(worst, std::abs(a[k] - b[k]));
   return worst;
-}
-
-// One pass over the points: their residuals against a surface, given by its cells' Bezier coefficients.
-struct ResidualPass {
-  AbsoluteMedian median;
-  double largest = 0;
-};
-
-// On the cells of `grid`, whose knots hold the net's.
-std::vector<std::array<double, 16>> bezier_cells(const Candidate& c, const MomentGrid& grid) {
-  struct Part {
-    int cell;
-    std::array<std::array<double, 4>, 4> turned;  // coefficients go the other way than moments
-  };
-  const auto parts = [](const SpanTable& table, int fine) {
-    const double begin = table[0].begin, step = (table[table.spans() - 1].end - begin) / fine;
-    std::vector<Part> all(static_cast<std::size_t>(fine));
-    for (int k = 0, cell = 0; k < fine; ++k) {
-      while (cell + 1 < table.spans() && begin + (k + 0.5) * step > table[cell].end) ++cell;
-      const double length = table[cell].end - table[cell].begin;
-      const auto r = fine == table.spans()
-                         ? restriction<3>(0, 1)
-                         : restriction<3>((begin + k * step - table[cell].begin) / length,
-                                          (begin + (k + 1) * step - table[cell].begin) / length);
-      Part& part = all[static_cast<std::size_t>(k)];
-      part.cell = fine == table.spans() ? k : cell;
-      for (int p = 0; p < 4; ++p) {
-        for (int l = 0; l < 4; ++l) part.turned[l][p] = r[p][l];
-      }
-    }
-    return all;
-  };
-  const std::vector<Part> u = parts(c.net.spans_u(), grid.cells_u()),
-                          v = parts(c.net.spans_v(), grid.cells_v());
-  std::vector<std::array<double, 16>> cells;
-  for (const Part& a : u) {
-    for (const Part& b : v) {
-      add_restricted<3>(a.turned, b.turned, c.net.bezier(c.coefficients, a.cell, b.cell),
-                        cells.emplace_back());
-    }
-  }
-  return cells;
-}
-
-// Residuals of all points; with `weights_into`, the points are folded into it anew with Tukey's weights.
-ResidualPass residual_pass(const PointColumns& columns, const MomentAccumulator& cells_of,
-                           const Candidate& fitted, double scale, MomentAccumulator* weights_into) {
-  const auto bezier = bezier_cells(fitted, cells_of.grid());
-  PointColumns plain = columns;
-  plain.weight = {};
-  PointBlock block;
-  block.shot_rows_wanted = true;
-  alignas(64) double height[PointBlock::capacity];
-  ResidualPass pass;
-  for (std::size_t first = 0; first < columns.size(); first += PointBlock::capacity) {
-    (void)cells_of.read(plain, first, block);  // was read without complaint before
-    moment_kernel().heights(block, bezier.data(), height);
-    for (int k = 0; k < block.count; ++k) {
-      const double residual = block.height[k] - height[k];
-      pass.largest = std::max(pass.largest, std::abs(residual));
-      pass.median.add(residual);
-      block.weight[k] = tukey_weight(residual, scale);
-      if (!columns.weight.empty()) block.weight[k] *= columns.weight[first + static_cast<std::size_t>(k)];
-    }
-    if (weights_into != nullptr) weights_into->fold(block);
-  }
-  return pass;
 }
 
 }  // namespace
 
-std::expected<MomentAccumulator, FitFailure> accumulator_for(const FitSettings& settings, double datum) {
+std::expected<MomentAccumulator, Flaw> accumulator_for(const FitSettings& settings, double datum) {
   if (const auto good = check_settings(settings); !good) return std::unexpected(good.error());
   if (!settings.knots_u.empty()) {
     return MomentAccumulator(SplineNet(settings.knots_u, settings.knots_v), datum);
@@ -390,20 +228,19 @@ bool has_cells_of(const MomentAccumulator& moments, const FitSettings& settings)
 
 }  // namespace
 
-std::expected<FittedSurface, FitFailure> fit_moments(const MomentAccumulator& moments,
-                                                     const FitSettings& settings) {
+std::expected<FittedSurface, Flaw> fit_moments(const MomentAccumulator& moments,
+                                               const FitSettings& settings) {
   if (const auto good = check_settings(settings); !good) return std::unexpected(good.error());
-  if (!has_cells_of(moments, settings)) return std::unexpected(FitFailure{Error::sizes_differ});
+  if (!has_cells_of(moments, settings)) return std::unexpected(Flaw{Error::sizes_differ});
   Fitter fitter(settings, moments);
   if (const auto good = fitter.run(); !good) return std::unexpected(good.error());
   return fitter.result();
 }
 
-std::expected<FittedSurface, FitFailure> fit_surface(const PointColumns& columns,
-                                                     const FitSettings& settings) {
-  if (columns.size() == 0) return std::unexpected(FitFailure{Error::too_few_points});
+std::expected<FittedSurface, Flaw> fit_surface(const PointColumns& columns, const FitSettings& settings) {
+  if (columns.size() == 0) return std::unexpected(Flaw{Error::too_few_points});
   const double datum = columns.z[0];
-  if (!std::isfinite(datum)) return std::unexpected(FitFailure{Error::not_finite, 0});
+  if (!std::isfinite(datum)) return std::unexpected(Flaw{Error::not_finite, 0});
   auto moments = accumulator_for(settings, datum);
   if (!moments) return std::unexpected(moments.error());
   if (const auto added = moments->add(columns); !added) return std::unexpected(added.error());
@@ -416,19 +253,18 @@ std::expected<FittedSurface, FitFailure> fit_surface(const PointColumns& columns
 
   std::optional<MomentAccumulator> weighted;
   double scale = out.report.sigma;
-  // Heights that are met to rounding have no spread to weigh them by.
-  const double rounding = 1e-14 * std::sqrt(out.report.totals.squares / out.report.totals.weight);
+  const double rounding = rounding_share * std::sqrt(out.report.totals.squares / out.report.totals.weight);
   for (int pass = 0; pass < settings.robust_passes && scale > rounding; ++pass) {
-    const Candidate before = fitter->chosen();
+    const std::vector<double> before = fitter->chosen().coefficients;
     weighted.emplace(*accumulator_for(settings, datum));
-    const ResidualPass residuals = residual_pass(columns, *moments, before, scale, &*weighted);
+    const ResidualPass residuals = residual_pass(columns, *moments, fitter->chosen(), scale, &*weighted);
     fitter.emplace(settings, *weighted);
     if (const auto good = fitter->run(); !good) return std::unexpected(good.error());
     out = fitter->result();
     const double scale_before = scale;
     scale = residuals.median.scale();
     out.report.robust_passes = pass + 1, out.report.robust_sigma = scale;
-    const double moved = difference(before, fitter->chosen());
+    const double moved = difference(before, fitter->chosen().coefficients);
     if (pass > 0 && moved < robust_rest * scale && std::abs(scale - scale_before) < robust_rest * scale)
       break;
   }
@@ -437,7 +273,7 @@ std::expected<FittedSurface, FitFailure> fit_surface(const PointColumns& columns
     FitSettings even = settings;
     even.control_u = out.surface.control_u(), even.control_v = out.surface.control_v();
     fitter.reset();
-    moments = std::unexpected(FitFailure{});
+    moments = std::unexpected(Flaw{});
     weighted.reset();
     auto again = fit_surface(columns, even);
     if (!again) return again;

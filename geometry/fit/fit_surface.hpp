@@ -21,7 +21,7 @@
 // Memory       independent of the number of points: <= 1 MiB on 23 x 23, 10 MiB on 64 x 64
 // Points       any order; a net is chosen only among those with at least 4 points for every control point, so a
 //              choice wants 196 of them (a given net 1 each, and with fairing any three that are on no line)
-// Failure      FitFailure names the error and the point, cell, coefficient or knot that it is about:
+// Failure      Flaw names the error and the point, cell, coefficient or knot that it is about:
 //              not_finite, too_large, negative_weight, outside_domain, sizes_differ, too_few_points, collinear
 //              (in plan view), no_extent (of the domain), empty_cells, singular, impossible_setting, capacity,
 //              those of knots.hpp
@@ -86,11 +86,11 @@ struct FittedSurface {
   FitReport report;
 };
 
-std::expected<FittedSurface, FitFailure> fit_surface(const PointColumns&, const FitSettings&);
+std::expected<FittedSurface, Flaw> fit_surface(const PointColumns&, const FitSettings&);
 
 // The same from moments that were added up before; robust and residual passes, which need the points, are
 // left out. The accumulator's cells must be those of the net (accumulator_for makes such a one).
-std::expected<FittedSurface, FitFailure> fit_moments(const MomentAccumulator&, const FitSettings&);
-std::expected<MomentAccumulator, FitFailure> accumulator_for(const FitSettings&, double datum = 0);
+std::expected<FittedSurface, Flaw> fit_moments(const MomentAccumulator&, const FitSettings&);
+std::expected<MomentAccumulator, Flaw> accumulator_for(const FitSettings&, double datum = 0);
 
 }  // namespace moldloft::geometry

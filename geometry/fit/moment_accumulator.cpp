@@ -10,16 +10,15 @@ namespace moldloft::geometry {
 
 namespace {
 
-std::expected<void, FitFailure> check_point(const PointColumns& columns, std::size_t i,
-                                            const FitDomain& domain) {
+std::expected<void, Flaw> check_point(const PointColumns& columns, std::size_t i, const FitDomain& domain) {
   const double u = columns.u[i], v = columns.v[i], z = columns.z[i];
   const double w = columns.weight.empty() ? 1 : columns.weight[i];
   if (!std::isfinite(u) || !std::isfinite(v) || !std::isfinite(z) || !std::isfinite(w)) {
-    return std::unexpected(FitFailure{Error::not_finite, i});
+    return std::unexpected(Flaw{Error::not_finite, i});
   }
-  if (w < 0) return std::unexpected(FitFailure{Error::negative_weight, i});
+  if (w < 0) return std::unexpected(Flaw{Error::negative_weight, i});
   if (u < domain.min_u || u > domain.max_u || v < domain.min_v || v > domain.max_v) {
-    return std::unexpected(FitFailure{Error::outside_domain, i});
+    return std::unexpected(Flaw{Error::outside_domain, i});
   }
   return {};
 }
@@ -35,7 +34,7 @@ UniformCells uniform_cells(const MomentGrid& grid, const FitDomain& domain) {
 
 }  // namespace
 
-std::expected<void, FitFailure> check_net_knots(std::span<const double> knots) {
+std::expected<void, Flaw> check_net_knots(std::span<const double> knots) {
   const auto good = check_cubic_knots(knots);
   if (good) return {};
   const std::size_t n = knots.size();
@@ -44,7 +43,7 @@ std::expected<void, FitFailure> check_net_knots(std::span<const double> knots) {
     while (i < n && !wrong(i)) ++i;
     return i;
   };
-  const auto blame = [&](std::size_t where) { return std::unexpected(FitFailure{good.error(), where}); };
+  const auto blame = [&](std::size_t where) { return std::unexpected(Flaw{good.error(), where}); };
   switch (good.error()) {
     case Error::not_finite:
       return blame(first_where([&](std::size_t i) { return !std::isfinite(knots[i]); }));
@@ -108,8 +107,8 @@ PointTotals MomentAccumulator::totals() const {
   return totals;
 }
 
-std::expected<void, FitFailure> MomentAccumulator::read(const PointColumns& columns, std::size_t first,
-                                                        PointBlock& block) const {
+std::expected<void, Flaw> MomentAccumulator::read(const PointColumns& columns, std::size_t first,
+                                                  PointBlock& block) const {
   alignas(64) double room[4][PointBlock::capacity];
   block.count = static_cast<int>(std::min<std::size_t>(PointBlock::capacity, columns.size() - first));
   block.weighted = !columns.weight.empty();
@@ -121,7 +120,7 @@ std::expected<void, FitFailure> MomentAccumulator::read(const PointColumns& colu
     const double* const w = columns.weight.block(first, block.count, room[3]);
     std::copy(w, w + block.count, block.weight);
   }
-  std::expected<void, FitFailure> good;
+  std::expected<void, Flaw> good;
   const auto check = [&] {
     for (int k = 0; k < block.count; ++k) {
       good = check_point(columns, first + static_cast<std::size_t>(k), domain_);
@@ -166,10 +165,10 @@ void MomentAccumulator::fold(PointBlock& block) {
   kernel_->fold(block, grid_.cells(), grid_.counts());
 }
 
-std::expected<void, FitFailure> MomentAccumulator::add(const PointColumns& columns) {
+std::expected<void, Flaw> MomentAccumulator::add(const PointColumns& columns) {
   if (columns.u.size() != columns.size() || columns.v.size() != columns.size() ||
       (!columns.weight.empty() && columns.weight.size() != columns.size()))
-    return std::unexpected(FitFailure{Error::sizes_differ});
+    return std::unexpected(Flaw{Error::sizes_differ});
   PointBlock block;
   for (std::size_t first = 0; first < columns.size(); first += PointBlock::capacity) {
     const auto good = read(columns, first, block);

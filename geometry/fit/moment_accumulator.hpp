@@ -29,21 +29,13 @@
 
 namespace moldloft::geometry {
 
-// What is wrong with data, and where: the number of the point, knot, cell or coefficient that the
-// error speaks of.
-struct FitFailure {
-  Error error{};
-  std::size_t where = 0;
-  bool operator==(const FitFailure&) const = default;
-};
-
 struct FitDomain {  // of the columns u and v
   double min_u = 0, max_u = 1, min_v = 0, max_v = 1;
   bool operator==(const FitDomain&) const = default;
 };
 
 // What check_cubic_knots() finds, and the first knot that it is about (for a wrong count, how many there are).
-std::expected<void, FitFailure> check_net_knots(std::span<const double> knots);
+std::expected<void, Flaw> check_net_knots(std::span<const double> knots);
 
 class MomentAccumulator {
  public:
@@ -52,7 +44,7 @@ class MomentAccumulator {
   // The cells of a net over knots that pass check_net_knots(); the columns are its parameters.
   MomentAccumulator(const SplineNet&, double datum, Simd = widest_simd());
 
-  std::expected<void, FitFailure> add(const PointColumns&);
+  std::expected<void, Flaw> add(const PointColumns&);
   void merge(const MomentAccumulator&);
   void subtract(const MomentAccumulator&);
   void clear();
@@ -65,7 +57,7 @@ class MomentAccumulator {
 
   // add() in two halves, for a pass that looks at residuals and weighs the points in between. A block's
   // cells and Bernstein values, cut short at a point that is refused:
-  std::expected<void, FitFailure> read(const PointColumns&, std::size_t first, PointBlock&) const;
+  std::expected<void, Flaw> read(const PointColumns&, std::size_t first, PointBlock&) const;
   // and such a block added with the weights that it has now.
   void fold(PointBlock&);
 

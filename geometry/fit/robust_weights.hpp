@@ -1,11 +1,14 @@
-// The scale of streamed residuals for Tukey's biweight (geometry/tukey.hpp), from a histogram, so that no
-// residual is kept.
+// Points weighed anew with Tukey's biweight (geometry/tukey.hpp) by their residuals from a fitted net. The residuals'
+// scale comes from a histogram, so that none is kept.
 //
 // Source       scale = 1.4826 median |r| (Huber 1981)
 // Accuracy     the median to 1 % (64 bins an octave, straight line within a bin)
-// Cost         5 ns a residual
-// Allocation   none
+// Cost         5 ns a residual, and reading the point
+// Allocation   none a point
 #pragma once
+
+#include "geometry/fit/moment_accumulator.hpp"
+#include "geometry/fit/net_search.hpp"
 
 #include <array>
 #include <bit>
@@ -47,5 +50,15 @@ class AbsoluteMedian {
   std::array<std::uint64_t, static_cast<std::size_t>(size)> bins_{};
   std::uint64_t count_ = 0;
 };
+
+struct ResidualPass {
+  AbsoluteMedian median;
+  double largest = 0;
+};
+
+// One pass over points that `cells_of` has taken: their residuals from the fitted net, whose knots are some of those
+// between the cells. With `weights_into`, the points are folded into it with Tukey's weights.
+ResidualPass residual_pass(const PointColumns&, const MomentAccumulator& cells_of, const NetCandidate& fitted,
+                           double scale, MomentAccumulator* weights_into);
 
 }  // namespace moldloft::geometry

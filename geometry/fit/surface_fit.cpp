@@ -1,13 +1,11 @@
 #include "geometry/fit/surface_fit.hpp"
 
-#include "geometry/fit/net_choice.hpp"
-#include "geometry/fit/net_solver.hpp"
+#include "geometry/fit/net_search.hpp"
 
 #include <algorithm>
 #include <bit>
 #include <cassert>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 // Blocks of matrices whose sizes were fixed in the constructor, vectors that grow within what was reserved there: the
@@ -18,35 +16,16 @@ namespace moldloft::geometry {
 
 namespace {
 
-constexpr int fewest_spans = 4;  // of a side as well: the nets must refine the sides' knots
-
-// Multiply-adds, about: of a cell from four, of a shot's cell into a coarser one, and of a cell's weight.
-constexpr double merge_cost = 2000, restrict_cost = 200, total_cost = 100;
+constexpr double total_cost = 100;  // multiply-adds, about, of a cell's weight
 
 constexpr int cleared_a_step = 512;  // cells: 0.3 MB
 
-// A net is tried when it has at least this many points for every unknown.
-constexpr double points_an_unknown = 4;
-
-struct Level {
-  Level(int spans_u, int spans_v) : net(spans_u, spans_v) {
-    surface.knots_u = uniform_clamped_knots(spans_u);
-    surface.knots_v = uniform_clamped_knots(spans_v);
-    surface.x = surface.y = surface.z = Eigen::MatrixXd::Zero(spans_u + cubic, spans_v + cubic);
-  }
-  SplineNet net;
+BSplineSurface surface_over(const SplineNet& net) {
   BSplineSurface surface;
-};
-
-// The finest net and its halvings, in both directions as long as both can be halved, then in the
-// one that can.
-std::vector<std::pair<int, int>> nested_nets(int spans_u, int spans_v) {
-  std::vector<std::pair<int, int>> nets{{spans_u, spans_v}};
-  while (nets.back() != std::pair(fewest_spans, fewest_spans)) {
-    nets.emplace_back(std::max(nets.back().first / 2, fewest_spans),
-                      std::max(nets.back().second / 2, fewest_spans));
-  }
-  return nets;
+  surface.knots_u = uniform_clamped_knots(net.cells_u());
+  surface.knots_v = uniform_clamped_knots(net.cells_v());
+  surface.x = surface.y = surface.z = Eigen::MatrixXd::Zero(net.control_u(), net.control_v());
+  return surface;
 }
 
 // Room for the shots' moments: a shot sees a tenth of a plate, every place is seen by a few shots, and small
@@ -59,32 +38,30 @@ std::size_t shot_cells_planned(const SurfaceFitSettings& settings) {
 }  // namespace
 
 struct SurfaceFit::Work {
-  enum class Phase { adding, total, merge, solve, compare, finish, done, failed };
+  enum class Phase { adding, total, search, done, failed };
 
   explicit Work(const SurfaceFitSettings& s)
       : settings(s),
-        solver((s.max_spans_u + 3u) * (s.max_spans_v + 3u),
-               3u * (std::min(s.max_spans_u, s.max_spans_v) + 3) + 3),
+        finest(s.max_spans_u, s.max_spans_v),
+        search(SplineNet(s.max_spans_u, s.max_spans_v), {.tolerance = s.tolerance_mm}),
         shots(s.max_shots, s.max_spans_u, s.max_spans_v, shot_cells_planned(s),
               s.shot_sigma_mm > 0 ? (s.max_spans_u + 3u) * (s.max_spans_v + 3u) : 0) {
-    for (const auto& [spans_u, spans_v] : nested_nets(s.max_spans_u, s.max_spans_v)) {
-      levels.emplace_back(spans_u, spans_v);
-      moments.emplace_back(spans_u, spans_v);
-    }
+    for (const NetCandidate& c : search.candidates()) surfaces.push_back(surface_over(c.net));
   }
 
   void fold(int of_shot);
   bool total_some();
-  void start_level();
-  std::expected<bool, Error> piece();
-  bool merge_some();
-  void keep_if_best();
+  std::expected<void, Flaw> start_search();
   void finish();
+  std::unexpected<Error> fail(const Flaw& flaw) {
+    error = flaw.error, phase = Phase::failed;
+    return std::unexpected(error);
+  }
 
   SurfaceFitSettings settings;
-  std::vector<Level> levels;        // finest first
-  std::vector<MomentGrid> moments;  // of every level; the first takes the points
-  NetSolver solver;
+  MomentGrid finest;  // takes the points
+  NetSearch search;
+  std::vector<BSplineSurface> surfaces;  // over every net of the search
   ShotOffsets shots;
   const PlanMap* map = nullptr;
   PointTotals totals;
@@ -93,12 +70,8 @@ struct SurfaceFit::Work {
   double datum = 0;  // heights are summed relative to the first point's, so that squares keep their digits
   Phase phase = Phase::adding;
   Error error = Error::too_few_points;
-  std::size_t level = 0, first_level = 0, best = 0;
-  int cell = 0, shot = 0;
-  std::size_t shot_cell = 0, shot_cells = 0;  // of the shot that merging is at
-  double best_score = 0, point_sigma = 0;
+  int cell = 0;  // that clearing or adding up is at
   double work = 0;
-  bool full = false;  // the step has no room for the next piece
   PointBlock block;
   std::array<double, PointBlock::capacity> u, v;
 };
@@ -114,10 +87,8 @@ SurfaceFit::SurfaceFit(const SurfaceFitSettings& settings) {
 SurfaceFit::~SurfaceFit() = default;
 
 std::size_t SurfaceFit::bytes() const {
-  std::size_t sum = sizeof(Work) + work_->solver.bytes() + work_->shots.bytes();
-  for (const MomentGrid& grid : work_->moments) sum += grid.bytes();
-  for (const Level& level : work_->levels)
-    sum += level.net.bytes() + 3 * level.surface.z.size() * sizeof(double);
+  std::size_t sum = sizeof(Work) + work_->finest.bytes() + work_->search.bytes() + work_->shots.bytes();
+  for (const BSplineSurface& surface : work_->surfaces) sum += 3 * surface.z.size() * sizeof(double);
   return sum;
 }
 
@@ -128,7 +99,7 @@ void SurfaceFit::begin(const PlanMap& map) {
 }
 
 bool SurfaceFit::clear_some() {
-  MomentGrid& finest = work_->moments.front();
+  MomentGrid& finest = work_->finest;
   const int end = std::min(work_->cell + cleared_a_step, finest.cell_count());
   finest.clear(work_->cell, end);
   work_->cell = end;
@@ -150,7 +121,6 @@ void SurfaceFit::begin_clearing(const PlanMap& map) {
 void SurfaceFit::Work::fold(int of_shot) {
   if (block.count == 0) return;
   const MomentKernel& kernel = moment_kernel();
-  MomentGrid& finest = moments.front();
   const int nu = settings.max_spans_u, nv = settings.max_spans_v;
   kernel.locate(block, u.data(), v.data(), {nu, nv, double(nu), double(nv), 0, 0});
   kernel.values(block);
@@ -192,187 +162,86 @@ std::expected<void, Error> SurfaceFit::add(std::span<const Eigen::Vector3d> worl
 }
 
 void SurfaceFit::start_solving() {
-  Work& work = *work_;
-  work.shots.finish_adding();
-  work.totals.weight = work.totals.squares = 0;
-  work.report.points_used = work.totals.points;
-  work.level = 0, work.cell = work.shot = 0, work.shot_cell = 0;
-  work.best_score = std::numeric_limits<double>::infinity();
-  work.point_sigma = work.settings.noise_mm;
-  // Nets with more unknowns than the points determine are passed over; their moments are merged all the same.
-  work.first_level = 0;
-  const auto determined = [&](const Level& level) {
-    return static_cast<double>(work.totals.points) >= points_an_unknown * level.net.unknowns();
-  };
-  while (work.first_level + 1 < work.levels.size() && !determined(work.levels[work.first_level]))
-    ++work.first_level;
-  if (work.map == nullptr || !determined(work.levels[work.first_level])) {
-    work.error = Error::too_few_points;
-    work.phase = Work::Phase::failed;
-    return;
-  }
-  work.phase = Work::Phase::total;
+  work_->shots.finish_adding();
+  work_->totals.weight = work_->totals.squares = 0;
+  work_->report.points_used = work_->totals.points;
+  work_->cell = 0;
+  work_->phase = Work::Phase::total;
 }
 
 // What all cells hold together; true when the last is in.
 bool SurfaceFit::Work::total_some() {
-  const MomentGrid& grid = moments.front();
-  for (; cell < grid.cell_count(); ++cell, work += total_cost) {
+  for (; cell < finest.cell_count(); ++cell, work += total_cost) {
     if (work + total_cost > NetSolver::work_a_step) return false;
-    totals.weight += grid.cells()[cell].weight();
-    totals.squares += grid.cells()[cell].squares();
+    totals.weight += finest.cells()[cell].weight();
+    totals.squares += finest.cells()[cell].squares();
   }
-  cell = 0;
   return true;
 }
 
-void SurfaceFit::Work::start_level() {
+std::expected<void, Flaw> SurfaceFit::Work::start_search() {
+  if (map == nullptr) return std::unexpected(Flaw{Error::too_few_points});
   const Eigen::Vector2d across = map->at(1, 0.5).value - map->at(0, 0.5).value;
   const Eigen::Vector2d along = map->at(0.5, 1).value - map->at(0.5, 0).value;
-  NetTask task;
-  task.net = &levels[level].net, task.moments = &moments[level], task.totals = totals;
-  task.length_u_mm = across.norm(), task.length_v_mm = along.norm();
-  task.fairing = settings.fairing;
-  task.shot_sigma_mm = settings.shot_sigma_mm, task.point_sigma_mm = point_sigma;
-  solver.start(task, &shots);
-  phase = Phase::solve;
+  NetTask model;
+  model.totals = totals;
+  model.length_u_mm = across.norm(), model.length_v_mm = along.norm();
+  model.fairing = settings.fairing;
+  model.shot_sigma_mm = settings.shot_sigma_mm, model.point_sigma_mm = settings.noise_mm;
+  return search.start(finest, model, &shots);
 }
 
-// Cells, then the shots' cells, into those of the next net; true when all are merged.
-bool SurfaceFit::Work::merge_some() {
-  MomentGrid& grid = moments[level];
-  if (cell < grid.cell_count()) {
-    const int room = static_cast<int>(std::max(0.0, NetSolver::work_a_step - work) / merge_cost);
-    const int end = std::min(cell + room, grid.cell_count());
-    grid.merge_cells(cell, end, moments[level - 1]);
-    work += merge_cost * (end - cell);
-    cell = end;
-    if (cell < grid.cell_count()) return false;
-  }
-  while (shot < shots.count()) {
-    if (shot_cell == 0) shot_cells = shots.cells_of(shot);
-    const auto room = static_cast<std::size_t>(std::max(0.0, NetSolver::work_a_step - work) / restrict_cost);
-    const std::size_t end = std::min(shot_cells, shot_cell + room);
-    if (end == shot_cell && end < shot_cells) return false;
-    shots.coarsen(shot, grid, shot_cell, end);
-    work += 30 + restrict_cost * static_cast<double>(end - shot_cell);
-    shot_cell = end;
-    if (end < shot_cells) return false;
-    ++shot, shot_cell = 0;
-  }
-  shots.coarsened(grid);
-  cell = shot = 0;
-  return true;
-}
-
-// The offsets are part of every net's model, so a finer net gains nothing by following the shots' steps.
-void SurfaceFit::Work::keep_if_best() {
-  const NetResult& result = solver.result();
-  point_sigma = result.point_sigma_mm;  // all nets are compared under the finest net's estimate
-  // Scores are mean squared errors of prediction, so their difference is the square of what the coarser
-  // net misses. Nets come from fine to coarse: each one within the tolerance of the best so far takes
-  // over from it.
-  const double score = generalized_cross_validation(totals, result);
-  if (!(score < best_score + settings.tolerance_mm * settings.tolerance_mm)) return;
-  best_score = std::min(best_score, score), best = level;
-  Level& kept = levels[level];
-  for (int i = 0; i < kept.net.control_u(); ++i) {
-    for (int j = 0; j < kept.net.control_v(); ++j) {
-      kept.surface.z(i, j) = solver.coefficients()[kept.net.index(i, j)] + datum;
-    }
-  }
-  const double n = static_cast<double>(totals.points);
-  report.spans_u = moments[level].cells_u(), report.spans_v = moments[level].cells_v();
-  report.rms_residual_mm = std::sqrt(result.squares / totals.weight);
-  report.sigma_mm = std::sqrt(result.squares / std::max(1.0, n - result.freedom));
-  report.smallest_pivot = result.smallest_pivot;
-  report.empty_cells = result.empty_cells;
-  report.shot_offset_rms_mm = result.offset_rms_mm, report.shot_offset_max_mm = result.offset_max_mm;
+void SurfaceFit::Work::finish() {
+  const NetCandidate& chosen = search.chosen();
+  BSplineSurface& surface = surfaces[search.chosen_place()];
+  chosen.heights_into(surface.z, datum);
+  map->to_net(surface);
+  const NetScore& score = search.score();
+  report.spans_u = score.spans_u, report.spans_v = score.spans_v;
+  report.rms_residual_mm = score.rms_residual, report.sigma_mm = score.sigma;
+  report.smallest_pivot = score.smallest_pivot;
+  report.empty_cells = score.empty_cells;
+  report.shot_offset_rms_mm = chosen.result.offset_rms_mm;
+  report.shot_offset_max_mm = chosen.result.offset_max_mm;
   report.shots_without_offset = shots.exact();
 }
 
-void SurfaceFit::Work::finish() { map->to_net(levels[best].surface); }
-
 std::expected<bool, Error> SurfaceFit::step() {
-  // Small nets and short phases share a step. Half of a step leaves room for the largest piece that cannot be divided.
-  work_->work = 0, work_->full = false;
-  while (true) {
-    const auto ready = work_->piece();
-    if (!ready || *ready || work_->full || work_->work >= NetSolver::work_a_step / 2) return ready;
-  }
-}
-
-std::expected<bool, Error> SurfaceFit::Work::piece() {
-  switch (phase) {
-    case Phase::adding:
+  Work& w = *work_;
+  w.work = 0;
+  switch (w.phase) {
+    case Work::Phase::adding:
       return std::unexpected(Error::too_few_points);
-    case Phase::failed:
-      return std::unexpected(error);
-    case Phase::done:
+    case Work::Phase::total:
+      if (!w.total_some()) return false;
+      if (const auto started = w.start_search(); !started) return w.fail(started.error());
+      w.phase = Work::Phase::search;
+      if (w.work >= NetSolver::work_a_step / 2) return false;
+      [[fallthrough]];
+    case Work::Phase::search: {
+      const auto found = w.search.step(NetSolver::work_a_step, w.work);
+      w.work = w.search.work();
+      if (!found) return w.fail(found.error());
+      if (!*found) return false;
+      w.finish();
+      w.phase = Work::Phase::done;
       return true;
-    case Phase::total:
-      full = !total_some();
-      if (full) return false;
-      if (first_level == 0) {
-        start_level();
-      } else {
-        level = 1, phase = Phase::merge;
-      }
-      return false;
-    case Phase::merge:
-      full = !merge_some();
-      if (full) return false;
-      if (level < first_level) {
-        ++level;
-      } else {
-        start_level();
-      }
-      return false;
-    case Phase::solve: {
-      const auto solved = solver.step(NetSolver::work_a_step - work);
-      work += solver.work();
-      full = solver.full();
-      if (!solved) {
-        error = solved.error(), phase = Phase::failed;
-        return std::unexpected(error);
-      }
-      if (*solved) phase = Phase::compare;
-      return false;
     }
-    case Phase::compare:
-      keep_if_best();
-      work += 10.0 * levels[level].net.unknowns();
-      phase = ++level < levels.size() ? Phase::merge : Phase::finish;
-      return false;
-    case Phase::finish:
-      finish();
-      phase = Phase::done;
+    case Work::Phase::done:
       return true;
+    case Work::Phase::failed:
+      break;
   }
-  return true;
+  return std::unexpected(w.error);
 }
 
 double SurfaceFit::progress() const {
-  const Work& work = *work_;
-  if (work.phase == Work::Phase::done) return 1;
-  if (work.phase == Work::Phase::adding || work.phase == Work::Phase::total ||
-      work.phase == Work::Phase::failed)
-    return 0;
-  // A net costs unknowns^2, near enough: sixteen times the next one.
-  double all = 0, done = 0;
-  for (std::size_t k = 0; k < work.levels.size(); ++k) {
-    const double unknowns = work.levels[k].net.unknowns(), cost = unknowns * unknowns;
-    all += cost;
-    if (k < work.level) done += cost;
-    if (k != work.level) continue;
-    if (work.phase == Work::Phase::solve) done += cost * work.solver.progress();
-    if (work.phase == Work::Phase::compare) done += cost;
-  }
-  return std::min(done / all, 0.999);
+  if (work_->phase == Work::Phase::done) return 1;
+  return work_->phase == Work::Phase::search ? work_->search.progress() : 0;
 }
 
 double SurfaceFit::work() const { return work_->work; }
-const BSplineSurface& SurfaceFit::surface() const { return work_->levels[work_->best].surface; }
+const BSplineSurface& SurfaceFit::surface() const { return work_->surfaces[work_->search.chosen_place()]; }
 const SurfaceFitReport& SurfaceFit::report() const { return work_->report; }
 
 }  // namespace moldloft::geometry

@@ -278,15 +278,15 @@ TEST_CASE("what cannot be fitted is named with its place") {
   const FitSettings settings{.control_u = 8, .control_v = 8, .fairing = no_fairing};
   CHECK(fit_surface({}, settings).error().error == Error::too_few_points);
   const test::FitPoints few = test::fit_points(63, 12, 0.1, wave);
-  CHECK(fit_surface(few.columns(), settings).error() == FitFailure{Error::too_few_points, 63});
+  CHECK(fit_surface(few.columns(), settings).error() == Flaw{Error::too_few_points, 63});
   CHECK(fit_surface(few.columns(), {}).error().error == Error::too_few_points);
   points.z[1234] = NAN;
-  CHECK(fit_surface(points.columns(), settings).error() == FitFailure{Error::not_finite, 1234});
+  CHECK(fit_surface(points.columns(), settings).error() == Flaw{Error::not_finite, 1234});
   points.z[1234] = 1, points.u[77] = 1.5;
-  CHECK(fit_surface(points.columns(), settings).error() == FitFailure{Error::outside_domain, 77});
+  CHECK(fit_surface(points.columns(), settings).error() == Flaw{Error::outside_domain, 77});
   CHECK(fit_surface(points.columns(),
                     {.knots_u = {0, 0, 0, 0, 0.7, 0.5, 1, 1, 1, 1}, .knots_v = {0, 0, 0, 0, 1, 1, 1, 1}})
-            .error() == FitFailure{Error::knots_not_increasing, 5});
+            .error() == Flaw{Error::knots_not_increasing, 5});
   CHECK(fit_surface(points.columns(), {.domain = {0, 0, 0, 1}}).error().error == Error::no_extent);
 
   // Every cell has points, but those of the last row of cells lie where it begins: nothing holds the last
@@ -335,7 +335,7 @@ TEST_CASE("a net is chosen from 16 to 5,000 points, smooth and wavy, scattered a
         CAPTURE(order);
         const auto fitted = fit_surface(points.columns(), {.residual_pass = true, .condition = true});
         if (size < 196) {
-          CHECK(fitted.error() == FitFailure{Error::too_few_points, static_cast<std::uint64_t>(size)});
+          CHECK(fitted.error() == Flaw{Error::too_few_points, static_cast<std::uint64_t>(size)});
           continue;
         }
         REQUIRE(fitted.has_value());
@@ -377,8 +377,8 @@ TEST_CASE("numbers no double can square, points on a line and settings without s
     const double kept = points.z[at];
     for (const double large : {1e300, -1e200, 1e308}) {
       points.z[at] = large;
-      CHECK(error({}) == FitFailure{Error::too_large, at});
-      CHECK(error({.control_u = 6, .control_v = 6}) == FitFailure{Error::too_large, at});
+      CHECK(error({}) == Flaw{Error::too_large, at});
+      CHECK(error({.control_u = 6, .control_v = 6}) == Flaw{Error::too_large, at});
     }
     points.z[at] = kept;
   }

@@ -159,11 +159,11 @@ TEST_CASE("cells of uneven knots are found as by search") {
 
 TEST_CASE("knots that cannot carry a cubic net are named") {
   const auto failure = [](std::vector<double> knots) { return check_net_knots(knots).error(); };
-  CHECK(failure({0, 0, 0, 0, 1, 1, 1}) == FitFailure{Error::knots_wrong_count, 7});
-  CHECK(failure({0, 0, 0, 0, 0.5, 0.4, 1, 1, 1, 1}) == FitFailure{Error::knots_not_increasing, 5});
-  CHECK(failure({0, 0, 0, 0, NAN, 0.4, 1, 1, 1, 1}) == FitFailure{Error::not_finite, 4});
-  CHECK(failure({0, 0, 0, 0.1, 0.5, 1, 1, 1, 1}) == FitFailure{Error::knots_not_clamped, 3});
-  CHECK(failure({0, 0, 0, 0, 0.5, 0.5, 0.5, 0.5, 1, 1, 1, 1}) == FitFailure{Error::knot_too_often, 7});
-  CHECK(failure({0, 0, 0, 0, 0.5, 1, 1, 1, 1, 1}) == FitFailure{Error::knot_too_often, 9});
+  CHECK(failure({0, 0, 0, 0, 1, 1, 1}) == Flaw{Error::knots_wrong_count, 7});
+  CHECK(failure({0, 0, 0, 0, 0.5, 0.4, 1, 1, 1, 1}) == Flaw{Error::knots_not_increasing, 5});
+  CHECK(failure({0, 0, 0, 0, NAN, 0.4, 1, 1, 1, 1}) == Flaw{Error::not_finite, 4});
+  CHECK(failure({0, 0, 0, 0.1, 0.5, 1, 1, 1, 1}) == Flaw{Error::knots_not_clamped, 3});
+  CHECK(failure({0, 0, 0, 0, 0.5, 0.5, 0.5, 0.5, 1, 1, 1, 1}) == Flaw{Error::knot_too_often, 7});
+  CHECK(failure({0, 0, 0, 0, 0.5, 1, 1, 1, 1, 1}) == Flaw{Error::knot_too_often, 9});
   CHECK(check_net_knots(std::vector<double>{0, 0, 0, 0, 0.5, 0.5, 0.5, 1, 1, 1, 1}).has_value());
 }

@@ -326,6 +326,19 @@ TEST_CASE("what cannot be fitted is refused by name, and points off the plate ar
   CHECK(surface_fit.step().error() == Error::too_few_points);
 }
 
+TEST_CASE(
+    "where points leave the model no freedom to compare nets by, the coarsest net is taken and stays by "
+    "them") {
+  const PlanMap map(test::straight_outline(square));
+  const Height flat = [](double, double) { return 700.0; };
+  // 49 control points and 100 offsets, counted 1.4 times, are more than 200 points: no net has a finite score.
+  SurfaceFit surface_fit({.max_spans_u = 16, .max_spans_v = 16, .max_shots = 128});
+  REQUIRE(fit(surface_fit, map, random_shots(map, flat, 100, 2, 0.05, 0.01, 3)).has_value());
+  CHECK(surface_fit.report().spans_u == 4);
+  CHECK(surface_fit.report().sigma_mm > 0);
+  CHECK(deviation(surface_fit.surface(), flat).max < 1);
+}
+
 TEST_CASE("when shots outgrow the memory plan they are taken as exact, and counted") {
   const PlanMap map(test::straight_outline(square));
   const Height flat = [](double, double) { return 3.0; };
