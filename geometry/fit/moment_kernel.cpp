@@ -1,7 +1,8 @@
 #include "geometry/fit/moment_kernel.hpp"
 
+#include "geometry/kernels.hpp"
+
 #include <array>
-#include <cassert>
 
 namespace moldloft::geometry {
 
@@ -45,7 +46,7 @@ constexpr auto& half3_columns = halves3.columns;
 
 }  // namespace moldloft::geometry
 
-#define MOLDLOFT_SIMD_KERNEL kernel
+#define MOLDLOFT_SIMD_KERNEL moment
 #define MOLDLOFT_SIMD_FILE "geometry/fit/moment_kernel.inc"
 #include "geometry/simd_variants.inc"
 
@@ -57,17 +58,10 @@ namespace moldloft::geometry {
         name::cell_gram                                                                        \
   }
 
-const MomentKernel& moment_kernel(Simd simd) {
-  assert(machine_has(simd));
-  static constexpr MomentKernel portable = MOLDLOFT_KERNEL(Simd::portable, portable_kernel);
-#if defined(__x86_64__)
-  static constexpr MomentKernel avx2 = MOLDLOFT_KERNEL(Simd::avx2, avx2_kernel);
-  static constexpr MomentKernel avx512 = MOLDLOFT_KERNEL(Simd::avx512, avx512_kernel);
-  if (simd == Simd::avx512) return avx512;
-  if (simd == Simd::avx2) return avx2;
-#endif
-  (void)simd;
-  return portable;
+namespace {
+constexpr KernelVariants<MomentKernel> variants{{MOLDLOFT_EVERY_WIDTH(MOLDLOFT_KERNEL, moment)}};
 }
+
+const MomentKernel& moment_kernel(Simd simd) { return variants(simd); }
 
 }  // namespace moldloft::geometry

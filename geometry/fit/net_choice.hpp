@@ -15,8 +15,8 @@
 
 namespace moldloft::geometry {
 
-// The coarsest of the nets to choose from, in each direction. A plan map's sides have as many spans, which a net must
-// refine.
+// The coarsest of the nets to choose from, in each direction. A plan map's sides have as many spans, and a net
+// must refine theirs.
 constexpr int fewest_spans = 4;
 
 // A net is tried when it has at least this many points for every unknown.

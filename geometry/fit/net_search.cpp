@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 namespace moldloft::geometry {
 
 namespace {
 
-// Multiply-adds, about: of a cell from four, of a shot's cell into a coarser one, of a shot, and of an unknown that is
-// kept.
+// Multiply-adds, about: of a cell from four, of a shot's cell into a coarser one, of a shot, of keeping an unknown.
 constexpr double merge_cost = 2000, restrict_cost = 200, shot_cost = 30, keep_cost = 10;
 
 // How many things at `cost` each a step has room for, at most `wanted`; one in any case where it has done nothing yet.
@@ -41,10 +41,10 @@ void NetCandidate::heights_into(Eigen::MatrixXd& z, double datum) const {
 }
 
 // The finest net and its halvings: in both directions as long as both can be halved, then in the one that can.
-std::vector<NetCandidate> NetSearch::candidates_of(const SplineNet& finest, bool nested) {
+std::vector<NetCandidate> NetSearch::candidates_of(SplineNet finest, bool nested) {
   std::vector<NetCandidate> nets;
-  nets.push_back({.net = finest});
   int u = finest.cells_u(), v = finest.cells_v();
+  nets.push_back({.net = std::move(finest)});
   while (nested && (u > fewest_spans || v > fewest_spans)) {
     u = std::max(u / 2, fewest_spans), v = std::max(v / 2, fewest_spans);
     nets.push_back({.net = SplineNet(u, v), .merged = MomentGrid(u, v)});
@@ -68,9 +68,9 @@ NetSolver NetSearch::solver_for(std::span<const NetCandidate> nets, const NetSea
   return solver;
 }
 
-NetSearch::NetSearch(const SplineNet& finest, const NetSearchSettings& settings, double most_points)
+NetSearch::NetSearch(SplineNet finest, const NetSearchSettings& settings, double most_points)
     : settings_(settings),
-      candidates_(candidates_of(finest, settings.nested)),
+      candidates_(candidates_of(std::move(finest), settings.nested)),
       scores_(candidates_.size()),
       solver_(solver_for(candidates_, settings, most_points)) {}
 

@@ -45,7 +45,7 @@ struct NetCandidate {
 class NetSearch {
  public:
   // Has room for all nets that `most_points` points let it try.
-  NetSearch(const SplineNet& finest, const NetSearchSettings&,
+  NetSearch(SplineNet finest, const NetSearchSettings&,
             double most_points = std::numeric_limits<double>::infinity());
 
   // A search over `points`, which has the finest net's cells, and must stay as it is, like the shots. The model's
@@ -77,7 +77,7 @@ class NetSearch {
  private:
   enum class Phase { merge, start, solve, score, done, failed };
 
-  static std::vector<NetCandidate> candidates_of(const SplineNet& finest, bool nested);
+  static std::vector<NetCandidate> candidates_of(SplineNet finest, bool nested);
   static NetSolver solver_for(std::span<const NetCandidate>, const NetSearchSettings&, double points);
   static bool determined(const NetCandidate&, const NetSearchSettings&, double points);
   const MomentGrid& grid(const NetCandidate& c) const { return c.merged ? *c.merged : *points_; }

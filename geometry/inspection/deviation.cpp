@@ -17,11 +17,10 @@ constexpr double near_share = 0.05;
 
 }  // namespace
 
-std::expected<void, InspectionError> measure_deviations(const PreparedSurface& surface,
-                                                        std::span<const Eigen::Vector3d> points,
-                                                        const DeviationSettings& settings,
-                                                        std::span<Deviation> out) {
-  if (out.size() < points.size()) return std::unexpected(InspectionError{Error::sizes_differ});
+std::expected<void, Flaw> measure_deviations(const PreparedSurface& surface,
+                                             std::span<const Eigen::Vector3d> points,
+                                             const DeviationSettings& settings, std::span<Deviation> out) {
+  if (out.size() < points.size()) return std::unexpected(Flaw{Error::sizes_differ});
   const PlainMotion design_from_plate(settings.design_from_plate);
   const Box& all = surface.box(surface.levels() - 1, 0, 0);
   const double near_square = near_share * near_share * (all.high - all.low).squaredNorm();
@@ -31,7 +30,7 @@ std::expected<void, InspectionError> measure_deviations(const PreparedSurface& s
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p = design_from_plate * points[i];
     if (!can_be_measured(p))
-      return std::unexpected(InspectionError{p.allFinite() ? Error::too_large : Error::not_finite, i});
+      return std::unexpected(Flaw{p.allFinite() ? Error::too_large : Error::not_finite, i});
     FootPoint foot;
     if (by_plan) {
       start = surface.guess_of(p);

@@ -17,8 +17,8 @@
 //              sizes_differ: fewer places than points, and nothing has been written
 #pragma once
 
+#include "geometry/error.hpp"
 #include "geometry/inspection/foot_point.hpp"
-#include "geometry/inspection/inspection_error.hpp"
 #include "geometry/rigid_motion.hpp"
 
 #include <array>
@@ -42,9 +42,8 @@ struct DeviationSettings {
   double border_tolerance_mm = 0.5;
 };
 
-std::expected<void, InspectionError> measure_deviations(const PreparedSurface&,
-                                                        std::span<const Eigen::Vector3d> points,
-                                                        const DeviationSettings&, std::span<Deviation> out);
+std::expected<void, Flaw> measure_deviations(const PreparedSurface&, std::span<const Eigen::Vector3d> points,
+                                             const DeviationSettings&, std::span<Deviation> out);
 
 struct DeviationSummary {
   std::size_t count = 0, beyond_border = 0;

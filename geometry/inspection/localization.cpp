@@ -116,27 +116,25 @@ struct Axes {
   }
 };
 
-std::optional<InspectionError> fault_of(std::span<const Vector3d> points,
-                                        const LocalizationSettings& settings, int free) {
+std::optional<Flaw> fault_of(std::span<const Vector3d> points, const LocalizationSettings& settings,
+                             int free) {
   // Three points fix a pose only together with the surface's curvature; six equations are the least
   // there must be.
-  if (points.size() < static_cast<std::size_t>(std::max(3, free)))
-    return InspectionError{Error::too_few_points};
-  if (!settings.weights.empty() && settings.weights.size() != points.size())
-    return InspectionError{Error::sizes_differ};
+  if (points.size() < static_cast<std::size_t>(std::max(3, free))) return Flaw{Error::too_few_points};
+  if (!settings.weights.empty() && settings.weights.size() != points.size()) return Flaw{Error::sizes_differ};
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!can_be_measured(points[i]))
-      return InspectionError{points[i].allFinite() ? Error::too_large : Error::not_finite, i};
+      return Flaw{points[i].allFinite() ? Error::too_large : Error::not_finite, i};
     if (settings.weights.empty()) continue;
-    if (!std::isfinite(settings.weights[i])) return InspectionError{Error::not_finite, i};
-    if (settings.weights[i] < 0) return InspectionError{Error::negative_weight, i};
+    if (!std::isfinite(settings.weights[i])) return Flaw{Error::not_finite, i};
+    if (settings.weights[i] < 0) return Flaw{Error::negative_weight, i};
   }
-  if (!settings.start.matrix().allFinite()) return InspectionError{Error::not_finite};
+  if (!settings.start.matrix().allFinite()) return Flaw{Error::not_finite};
   const Eigen::Matrix3d turn = settings.start.linear();
   if (!(turn.transpose() * turn).isIdentity(1e-6) || turn.determinant() < 0 ||
       !can_be_measured(settings.start.translation()) || !(settings.tolerance_mm >= 0) ||
       !(settings.border_tolerance_mm >= 0) || !(settings.sigma_mm >= 0) || !(settings.settled_mm > 0))
-    return InspectionError{Error::impossible_setting};
+    return Flaw{Error::impossible_setting};
   return std::nullopt;
 }
 
@@ -145,7 +143,7 @@ class Alignment {
   Alignment(const PreparedSurface& design, std::span<const Vector3d> points, const LocalizationSettings& s)
       : settings_(s), free_(s.fixed), system_(design, points, s.weights), pose_(s.start) {}
 
-  std::expected<Localization, InspectionError> run() {
+  std::expected<Localization, Flaw> run() {
     const auto& spread = system_.moments().spread;
     if (!(spread[1] > flat_spread * spread[2])) return failed(Error::collinear);
     if (free_.count > 0 && settings_.robust) {
@@ -166,9 +164,7 @@ class Alignment {
   }
 
  private:
-  static std::unexpected<InspectionError> failed(Error error) {
-    return std::unexpected(InspectionError{error});
-  }
+  static std::unexpected<Flaw> failed(Error error) { return std::unexpected(Flaw{error}); }
 
   PointPlaneSums pass(double tukey_mm = 0) {
     ++iterations_;
@@ -475,7 +471,7 @@ class Alignment {
     contact_count_ = std::min(least.active_count, 6);
   }
 
-  std::expected<Localization, InspectionError> result() {
+  std::expected<Localization, Flaw> result() {
     // The covariance wants all points with their plain weights. The last pass saw the pose but for a step too
     // short to matter, unless its weights were robust or there was nothing to settle.
     const bool seen = tukey_mm_ == 0 && sums_.points > 0;
@@ -555,9 +551,9 @@ class Alignment {
 
 }  // namespace
 
-std::expected<Localization, InspectionError> localize(const PreparedSurface& design,
-                                                      std::span<const Vector3d> plate_points,
-                                                      const LocalizationSettings& settings) {
+std::expected<Localization, Flaw> localize(const PreparedSurface& design,
+                                           std::span<const Vector3d> plate_points,
+                                           const LocalizationSettings& settings) {
   const FreeDirections free(settings.fixed);
   if (const auto fault = fault_of(plate_points, settings, free.count)) return std::unexpected(*fault);
   return Alignment(design, plate_points, settings).run();

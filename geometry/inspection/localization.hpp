@@ -22,14 +22,14 @@
 //              their bound by less than 1e-9 mm
 // Cost         0.13 us a point and iteration; 3 to 8 iterations, robust 12 to 25
 // Allocation   34 bytes a point, one-sided 90
-// Failure      InspectionError names the error and, for not_finite and negative weights, the point:
+// Failure      Flaw names the error and, for not_finite and negative weights, the point:
 //              too_few_points (fewer than 6, or than 3 free directions ask for, also once points beyond the
 //              border and outliers are left out), not_finite, too_large, negative_weight, sizes_differ, collinear,
 //              undetermined_pose (a plane lets points slide: fix those directions), no_feasible_pose,
 //              not_converged, impossible_setting (a negative tolerance, a start that is no rigid motion)
 #pragma once
 
-#include "geometry/inspection/inspection_error.hpp"
+#include "geometry/error.hpp"
 #include "geometry/inspection/point_plane_system.hpp"
 #include "geometry/inspection/prepared_surface.hpp"
 
@@ -94,8 +94,8 @@ struct Localization {
   int contact_count = 0;
 };
 
-std::expected<Localization, InspectionError> localize(const PreparedSurface& design,
-                                                      std::span<const Eigen::Vector3d> plate_points,
-                                                      const LocalizationSettings& settings = {});
+std::expected<Localization, Flaw> localize(const PreparedSurface& design,
+                                           std::span<const Eigen::Vector3d> plate_points,
+                                           const LocalizationSettings& settings = {});
 
 }  // namespace moldloft::geometry

@@ -10,20 +10,18 @@ namespace moldloft::geometry {
 
 namespace {
 
-std::unexpected<CurveFitError> failed(Error what, std::ptrdiff_t where) {
-  return std::unexpected(CurveFitError{what, static_cast<int>(where)});
+std::unexpected<Flaw> failed(Error error, std::ptrdiff_t where) {
+  return std::unexpected(Flaw{error, static_cast<std::size_t>(where)});
 }
 
 template <int dim>
-std::optional<CurveFitError> what_is_wrong(Points<dim> points, std::span<const double> parameters,
-                                           double begin, double end) {
-  if (points.size() != parameters.size()) return CurveFitError{Error::sizes_differ};
+std::optional<Flaw> what_is_wrong(Points<dim> points, std::span<const double> parameters, double begin,
+                                  double end) {
+  if (points.size() != parameters.size()) return Flaw{Error::sizes_differ};
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const int where = static_cast<int>(i);
-    if (!points[i].allFinite() || !std::isfinite(parameters[i]))
-      return CurveFitError{Error::not_finite, where};
-    if (i > 0 && parameters[i] < parameters[i - 1]) return CurveFitError{Error::repeated_points, where};
-    if (parameters[i] < begin || parameters[i] > end) return CurveFitError{Error::outside_domain, where};
+    if (!points[i].allFinite() || !std::isfinite(parameters[i])) return Flaw{Error::not_finite, i};
+    if (i > 0 && parameters[i] < parameters[i - 1]) return Flaw{Error::repeated_points, i};
+    if (parameters[i] < begin || parameters[i] > end) return Flaw{Error::outside_domain, i};
   }
   return std::nullopt;
 }
@@ -41,23 +39,18 @@ void measure(CurveFit<dim>& fit, Points<dim> points) {
 
 // The fit on balanced knots with so many control points, for data that have been looked at already.
 template <int dim>
-std::expected<CurveFit<dim>, CurveFitError> fit_balanced(Points<dim> points,
-                                                         std::span<const double> parameters,
-                                                         int control_points,
-                                                         const CurveFitSettings& settings) {
+std::expected<CurveFit<dim>, Flaw> fit_balanced(Points<dim> points, std::span<const double> parameters,
+                                                int control_points, const CurveFitSettings& settings) {
   return fit_curve<dim>(points, parameters, balanced_knots(parameters, control_points, settings.degree),
                         settings);
 }
 
 template <int dim>
-std::optional<CurveFitError> cannot_choose(Points<dim> points, std::span<const double> parameters,
-                                           int degree) {
-  if (static_cast<int>(points.size()) <= degree)
-    return CurveFitError{Error::too_few_points, static_cast<int>(points.size())};
+std::optional<Flaw> cannot_choose(Points<dim> points, std::span<const double> parameters, int degree) {
+  if (static_cast<int>(points.size()) <= degree) return Flaw{Error::too_few_points, points.size()};
   if (const auto wrong = what_is_wrong<dim>(points, parameters, parameters.front(), parameters.back()))
     return wrong;
-  if (!(parameters.front() < parameters.back()))
-    return CurveFitError{Error::repeated_points, static_cast<int>(points.size()) - 1};
+  if (!(parameters.front() < parameters.back())) return Flaw{Error::repeated_points, points.size() - 1};
   return std::nullopt;
 }
 
@@ -80,7 +73,7 @@ int first_without_parameter(std::span<const double> knots, int degree, std::span
 }
 
 template <int dim>
-std::expected<std::vector<double>, CurveFitError> chord_length_parameters(Points<dim> points) {
+std::expected<std::vector<double>, Flaw> chord_length_parameters(Points<dim> points) {
   if (points.size() < 2) return failed(Error::too_few_points, std::ssize(points));
   std::vector<double> parameters(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -96,9 +89,9 @@ std::expected<std::vector<double>, CurveFitError> chord_length_parameters(Points
 }
 
 template <int dim>
-std::expected<CurveFit<dim>, CurveFitError> fit_curve(Points<dim> points, std::span<const double> parameters,
-                                                      std::span<const double> knots,
-                                                      const CurveFitSettings& settings) {
+std::expected<CurveFit<dim>, Flaw> fit_curve(Points<dim> points, std::span<const double> parameters,
+                                             std::span<const double> knots,
+                                             const CurveFitSettings& settings) {
   const int degree = settings.degree, control_points = static_cast<int>(knots.size()) - degree - 1;
   if (const auto checked = check_knots(knots, degree, control_points); !checked)
     return failed(checked.error(), 0);
@@ -137,38 +130,37 @@ std::expected<CurveFit<dim>, CurveFitError> fit_curve(Points<dim> points, std::s
 }
 
 template <int dim>
-std::expected<CurveFit<dim>, CurveFitError> fit_curve(Points<dim> points, std::span<const double> knots,
-                                                      const CurveFitSettings& settings) {
+std::expected<CurveFit<dim>, Flaw> fit_curve(Points<dim> points, std::span<const double> knots,
+                                             const CurveFitSettings& settings) {
   const auto parameters = chord_length_parameters<dim>(points);
   if (!parameters) return std::unexpected(parameters.error());
   return fit_curve<dim>(points, *parameters, knots, settings);
 }
 
 template <int dim>
-std::expected<CurveFit<dim>, CurveFitError> fit_curve_within(Points<dim> points,
-                                                             std::span<const double> parameters,
-                                                             double tolerance,
-                                                             const CurveFitSettings& settings) {
+std::expected<CurveFit<dim>, Flaw> fit_curve_within(Points<dim> points, std::span<const double> parameters,
+                                                    double tolerance, const CurveFitSettings& settings) {
   if (const auto wrong = cannot_choose<dim>(points, parameters, settings.degree))
     return std::unexpected(*wrong);
-  CurveFitError closest{Error::tolerance_not_met, 0, std::numeric_limits<double>::infinity()};
+  Flaw closest{Error::tolerance_not_met};
+  double least = std::numeric_limits<double>::infinity();
   for (int n = settings.degree + 1; n <= static_cast<int>(points.size()); ++n) {
     auto fit = fit_balanced<dim>(points, parameters, n, settings);
     if (!fit) continue;  // parameters too uneven for that many: others may do
     if (fit->max <= tolerance) return fit;
-    if (fit->max < closest.closest) closest.where = n, closest.closest = fit->max;
+    if (fit->max < least) closest.where = static_cast<std::size_t>(n), least = fit->max;
   }
   return std::unexpected(closest);
 }
 
 template <int dim>
-std::expected<CurveFit<dim>, CurveFitError> fit_curve_by_cross_validation(Points<dim> points,
-                                                                          std::span<const double> parameters,
-                                                                          const CurveFitSettings& settings) {
+std::expected<CurveFit<dim>, Flaw> fit_curve_by_cross_validation(Points<dim> points,
+                                                                 std::span<const double> parameters,
+                                                                 const CurveFitSettings& settings) {
   if (const auto wrong = cannot_choose<dim>(points, parameters, settings.degree))
     return std::unexpected(*wrong);
   const int count = static_cast<int>(points.size());
-  std::expected<CurveFit<dim>, CurveFitError> best = failed(Error::span_without_points, 0);
+  std::expected<CurveFit<dim>, Flaw> best = failed(Error::span_without_points, 0);
   double least = std::numeric_limits<double>::infinity();
   for (int n = settings.degree + 1; n <= std::max(count / 2, settings.degree + 1); ++n) {
     auto fit = fit_balanced<dim>(points, parameters, n, settings);
@@ -180,15 +172,15 @@ std::expected<CurveFit<dim>, CurveFitError> fit_curve_by_cross_validation(Points
   return best;
 }
 
-#define MOLDLOFT_FITS_OF(dim)                                                                               \
-  template std::expected<std::vector<double>, CurveFitError> chord_length_parameters<dim>(Points<dim>);     \
-  template std::expected<CurveFit<dim>, CurveFitError> fit_curve<dim>(                                      \
-      Points<dim>, std::span<const double>, std::span<const double>, const CurveFitSettings&);              \
-  template std::expected<CurveFit<dim>, CurveFitError> fit_curve<dim>(Points<dim>, std::span<const double>, \
-                                                                      const CurveFitSettings&);             \
-  template std::expected<CurveFit<dim>, CurveFitError> fit_curve_within<dim>(                               \
-      Points<dim>, std::span<const double>, double, const CurveFitSettings&);                               \
-  template std::expected<CurveFit<dim>, CurveFitError> fit_curve_by_cross_validation<dim>(                  \
+#define MOLDLOFT_FITS_OF(dim)                                                                             \
+  template std::expected<std::vector<double>, Flaw> chord_length_parameters<dim>(Points<dim>);            \
+  template std::expected<CurveFit<dim>, Flaw> fit_curve<dim>(                                             \
+      Points<dim>, std::span<const double>, std::span<const double>, const CurveFitSettings&);            \
+  template std::expected<CurveFit<dim>, Flaw> fit_curve<dim>(Points<dim>, std::span<const double>,        \
+                                                             const CurveFitSettings&);                    \
+  template std::expected<CurveFit<dim>, Flaw> fit_curve_within<dim>(Points<dim>, std::span<const double>, \
+                                                                    double, const CurveFitSettings&);     \
+  template std::expected<CurveFit<dim>, Flaw> fit_curve_by_cross_validation<dim>(                         \
       Points<dim>, std::span<const double>, const CurveFitSettings&);
 MOLDLOFT_FITS_OF(1)
 MOLDLOFT_FITS_OF(2)

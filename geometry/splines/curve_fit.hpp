@@ -8,19 +8,8 @@
 //              back within that
 // Cost         N p^2 for a fit; N p^2 for every number of control points that is tried
 // Allocation   what is returned, and a triangle of n (p + 4) numbers
-// Failure      CurveFitError; see there
-#pragma once
-
-#include "geometry/error.hpp"
-#include "geometry/splines/banded_least_squares.hpp"
-#include "geometry/splines/bspline.hpp"
-
-#include <expected>
-#include <span>
-#include <vector>
-
-namespace moldloft::geometry {
-
+// Failure      a Flaw, where it says `where`:
+//
 // too_few_points       fewer points than control points (`where`: how many there are)
 // not_finite           the point or parameter `where`
 // repeated_points      points where - 1 and where lie in one place, or the parameter `where` is below the
@@ -33,11 +22,17 @@ namespace moldloft::geometry {
 //                      control point `where`
 // tolerance_not_met    `where`: the number of control points that came closest
 // what check_knots() finds, with `where` = 0
-struct CurveFitError {
-  Error what;
-  int where = 0;
-  double closest = 0;  // tolerance_not_met: how close that was
-};
+#pragma once
+
+#include "geometry/error.hpp"
+#include "geometry/splines/banded_least_squares.hpp"
+#include "geometry/splines/bspline.hpp"
+
+#include <expected>
+#include <span>
+#include <vector>
+
+namespace moldloft::geometry {
 
 struct CurveFitSettings {
   int degree = cubic;
@@ -58,30 +53,29 @@ using Points = std::span<const Eigen::Matrix<double, dim, 1>>;
 
 // Parameters in [0, 1] by the lengths of the chords between consecutive points.
 template <int dim>
-std::expected<std::vector<double>, CurveFitError> chord_length_parameters(Points<dim> points);
+std::expected<std::vector<double>, Flaw> chord_length_parameters(Points<dim> points);
 
 // Over `knots`, each point at its parameter (not decreasing); and with chord lengths.
 template <int dim>
-std::expected<CurveFit<dim>, CurveFitError> fit_curve(Points<dim> points, std::span<const double> parameters,
-                                                      std::span<const double> knots,
-                                                      const CurveFitSettings& settings = {});
+std::expected<CurveFit<dim>, Flaw> fit_curve(Points<dim> points, std::span<const double> parameters,
+                                             std::span<const double> knots,
+                                             const CurveFitSettings& settings = {});
 template <int dim>
-std::expected<CurveFit<dim>, CurveFitError> fit_curve(Points<dim> points, std::span<const double> knots,
-                                                      const CurveFitSettings& settings = {});
+std::expected<CurveFit<dim>, Flaw> fit_curve(Points<dim> points, std::span<const double> knots,
+                                             const CurveFitSettings& settings = {});
 
 // The fewest control points, on balanced knots (knots.hpp), with which no point is farther off than
 // `tolerance`; every number from degree + 1 up is tried, so there is no smaller one.
 template <int dim>
-std::expected<CurveFit<dim>, CurveFitError> fit_curve_within(Points<dim> points,
-                                                             std::span<const double> parameters,
-                                                             double tolerance,
-                                                             const CurveFitSettings& settings = {});
+std::expected<CurveFit<dim>, Flaw> fit_curve_within(Points<dim> points, std::span<const double> parameters,
+                                                    double tolerance, const CurveFitSettings& settings = {});
 
 // The number of control points n, up to half the points, with the least generalized cross-validation score
 // (RSS / N) / (1 - n / N)^2 (Craven and Wahba 1979): what noise of unknown size supports.
 template <int dim>
-std::expected<CurveFit<dim>, CurveFitError> fit_curve_by_cross_validation(
-    Points<dim> points, std::span<const double> parameters, const CurveFitSettings& settings = {});
+std::expected<CurveFit<dim>, Flaw> fit_curve_by_cross_validation(Points<dim> points,
+                                                                 std::span<const double> parameters,
+                                                                 const CurveFitSettings& settings = {});
 
 // The first control point among [first, end) that Schoenberg and Whitney find without a parameter of its own;
 // `end` if all have one. Parameters must not decrease.

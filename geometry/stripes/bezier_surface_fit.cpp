@@ -18,7 +18,7 @@ namespace {
 std::expected<void, MatchingFailure> check(std::span<const BezierStripe> stripes,
                                            const BezierFitSettings& settings) {
   const auto blame = [](Error what, std::size_t stripe) {
-    return std::unexpected(MatchingFailure{.what = what, .stripe = static_cast<int>(stripe)});
+    return std::unexpected(MatchingFailure{.error = what, .stripe = static_cast<int>(stripe)});
   };
   constexpr double rounding = 1e-12;
   const auto inside = [](double x) { return x >= -rounding && x <= 1 + rounding; };
@@ -81,8 +81,8 @@ std::expected<BezierSurfaceFit, MatchingFailure> fit_bezier_surface(std::span<co
   const int raised = settings.degree_u + settings.degree_v;
   const bool ring_given = settings.boundary.rows() > 0;
   if (ring_given && settings.boundary.rows() != control_count)
-    return std::unexpected(MatchingFailure{.what = Error::too_few_points});
-  if (!settings.boundary.allFinite()) return std::unexpected(MatchingFailure{.what = Error::not_finite});
+    return std::unexpected(MatchingFailure{.error = Error::too_few_points});
+  if (!settings.boundary.allFinite()) return std::unexpected(MatchingFailure{.error = Error::not_finite});
 
   std::vector<Eigen::Index> unknown;  // columns that are solved for
   for (int i = 0; i <= settings.degree_u; ++i)
@@ -93,7 +93,7 @@ std::expected<BezierSurfaceFit, MatchingFailure> fit_bezier_surface(std::span<co
   BezierSurfaceFit fit;
   fit.unknowns = static_cast<int>(unknowns);
   fit.equations = static_cast<int>(stripes.size()) * (raised + 1);
-  if (fit.equations < fit.unknowns) return std::unexpected(MatchingFailure{.what = Error::too_few_stripes});
+  if (fit.equations < fit.unknowns) return std::unexpected(MatchingFailure{.error = Error::too_few_stripes});
 
   Eigen::MatrixXd matrix;
   matching_matrix(settings.degree_u, settings.degree_v, stripes, matrix);
@@ -113,7 +113,7 @@ std::expected<BezierSurfaceFit, MatchingFailure> fit_bezier_surface(std::span<co
     const auto singular = [&](const Eigen::MatrixXd& triangle) {
       const int column = static_cast<int>(unknown[free_column(triangle)]);
       return std::unexpected(MatchingFailure{
-          .what = Error::singular, .control = {column / nv, column % nv}, .condition = fit.condition});
+          .error = Error::singular, .control = {column / nv, column % nv}, .condition = fit.condition});
     };
     Eigen::MatrixX3d found;
     Eigen::MatrixXd triangle;

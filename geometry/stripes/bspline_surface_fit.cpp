@@ -104,15 +104,15 @@ std::expected<BSplineSurfaceFit, MatchingFailure> BSplineSurfaceFit::assemble(
       static_cast<int>(fit.pieces_.size()), static_cast<int>(fit.samples_.size()), fit.system_.size(), {}};
   const long equations = 7L * fit.report_.pieces + fit.report_.samples;
   if (equations < fit.report_.unknowns)
-    return std::unexpected(MatchingFailure{.what = Error::too_few_stripes});
+    return std::unexpected(MatchingFailure{.error = Error::too_few_stripes});
   const auto pivot = fit.system_.factor();
-  if (!pivot) return std::unexpected(MatchingFailure{.what = Error::singular, .control = pivot.error()});
+  if (!pivot) return std::unexpected(MatchingFailure{.error = Error::singular, .control = pivot.error()});
   // Small pivots magnify rounding one after the other, so that a pivot which is nothing else may stand above each bound
   // that is made of one. By this the control points' error bound is as large as they are.
   const double no_digit_left = 1 / (4 * fit.half_band() * std::numeric_limits<double>::epsilon());
   if (const double condition = fit.condition(); !(condition < no_digit_left)) {
     return std::unexpected(
-        MatchingFailure{.what = Error::singular, .control = pivot->weakest, .condition = condition});
+        MatchingFailure{.error = Error::singular, .control = pivot->weakest, .condition = condition});
   }
   fit.report_.pivot = *pivot;
   return fit;
@@ -159,33 +159,33 @@ std::expected<void, MatchingFailure> BSplineSurfaceFit::check_data(std::span<con
                                                                    std::span<const SampledPoints> samples,
                                                                    const BSplineSurface& base) const {
   if (stripes.size() != stripe_knots_.size() || samples.size() != sample_count_.size())
-    return std::unexpected(MatchingFailure{.what = Error::too_few_points});
+    return std::unexpected(MatchingFailure{.error = Error::too_few_points});
   const auto finite = [](const Eigen::Vector3d& point) { return point.allFinite(); };
   for (std::size_t s = 0; s < stripes.size(); ++s) {
     const auto& [knots, control, degree] = stripes[s];
     const int stripe = static_cast<int>(s);
     if (degree != cubic || knots != stripe_knots_[s])
-      return std::unexpected(MatchingFailure{.what = Error::curves_not_compatible, .stripe = stripe});
+      return std::unexpected(MatchingFailure{.error = Error::curves_not_compatible, .stripe = stripe});
     if (control.size() + cubic + 1 != knots.size())
-      return std::unexpected(MatchingFailure{.what = Error::too_few_points, .stripe = stripe});
+      return std::unexpected(MatchingFailure{.error = Error::too_few_points, .stripe = stripe});
     if (!std::ranges::all_of(control, finite))
-      return std::unexpected(MatchingFailure{.what = Error::not_finite, .stripe = stripe});
+      return std::unexpected(MatchingFailure{.error = Error::not_finite, .stripe = stripe});
   }
   for (std::size_t s = 0; s < samples.size(); ++s) {
     const int stripe = static_cast<int>(stripes.size() + s);
     if (samples[s].size() != sample_count_[s])
-      return std::unexpected(MatchingFailure{.what = Error::too_few_points, .stripe = stripe});
+      return std::unexpected(MatchingFailure{.error = Error::too_few_points, .stripe = stripe});
     if (!std::ranges::all_of(samples[s], finite))
-      return std::unexpected(MatchingFailure{.what = Error::not_finite, .stripe = stripe});
+      return std::unexpected(MatchingFailure{.error = Error::not_finite, .stripe = stripe});
   }
   if (system_.ring() == Ring::given) {
     const auto wrong = [&](const Eigen::MatrixXd& net) {
       return net.rows() != control_u() || net.cols() != control_v();
     };
     if (wrong(base.x) || wrong(base.y) || wrong(base.z))
-      return std::unexpected(MatchingFailure{.what = Error::too_few_points});
+      return std::unexpected(MatchingFailure{.error = Error::too_few_points});
     if (!base.x.allFinite() || !base.y.allFinite() || !base.z.allFinite())
-      return std::unexpected(MatchingFailure{.what = Error::not_finite});
+      return std::unexpected(MatchingFailure{.error = Error::not_finite});
   }
   return {};
 }

@@ -16,10 +16,10 @@ void stretch_to_unit(SpaceCurve& curve) {
 
 }  // namespace
 
-std::expected<CoonsPatch, CoonsError> CoonsPatch::through(CoonsSides sides, double gap_mm) {
+std::expected<CoonsPatch, Flaw> CoonsPatch::through(CoonsSides sides, double gap_mm) {
   SpaceCurve* const all[] = {&sides.low_v, &sides.high_v, &sides.low_u, &sides.high_u};
-  for (int i = 0; i < 4; ++i) {
-    if (const auto checked = check(*all[i]); !checked) return std::unexpected(CoonsError{checked.error(), i});
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (const auto checked = check(*all[i]); !checked) return std::unexpected(Flaw{checked.error(), i});
     stretch_to_unit(*all[i]);
   }
   const std::pair<const Eigen::Vector3d&, const Eigen::Vector3d&> meeting[] = {
@@ -28,10 +28,9 @@ std::expected<CoonsPatch, CoonsError> CoonsPatch::through(CoonsSides sides, doub
       {sides.high_v.control.front(), sides.low_u.control.back()},
       {sides.high_v.control.back(), sides.high_u.control.back()}};
   CoonsPatch patch;
-  for (int corner = 0; corner < 4; ++corner) {
+  for (std::size_t corner = 0; corner < 4; ++corner) {
     const auto& [a, b] = meeting[corner];
-    const double gap = (a - b).norm();
-    if (!(gap <= gap_mm)) return std::unexpected(CoonsError{Error::corners_apart, corner, gap});
+    if (!((a - b).norm() <= gap_mm)) return std::unexpected(Flaw{Error::corners_apart, corner});
     patch.corners_[corner] = 0.5 * (a + b);
   }
   patch.sides_ = std::move(sides);

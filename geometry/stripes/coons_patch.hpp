@@ -10,9 +10,11 @@
 //              the largest coordinate
 // Cost         a point: four curve points; the net: 12 flops and two curve refinements a control point
 // Allocation   none in at(); what is returned elsewhere
-// Failure      CoonsError: what check() finds in a curve, or corners_apart
+// Failure      what check() finds in a curve, with the side in the order of CoonsSides; corners_apart with the
+//              corner, in the order (0, 0), (1, 0), (0, 1), (1, 1)
 #pragma once
 
+#include "geometry/error.hpp"
 #include "geometry/splines/bspline.hpp"
 
 #include <array>
@@ -28,18 +30,11 @@ struct CoonsSides {
   SpaceCurve high_u;  // along v at u = 1
 };
 
-// Corners in the order (0, 0), (1, 0), (0, 1), (1, 1); sides in the order of CoonsSides.
-struct CoonsError {
-  Error what;
-  int where = 0;      // corners_apart: the corner; otherwise the side
-  double gap_mm = 0;  // corners_apart: how far the two ends lie from each other
-};
-
 class CoonsPatch {
  public:
   // Ends may miss each other by `gap_mm`; the corner then lies halfway between them, and the patch keeps its
   // sides only that well.
-  static std::expected<CoonsPatch, CoonsError> through(CoonsSides sides, double gap_mm = 1e-6);
+  static std::expected<CoonsPatch, Flaw> through(CoonsSides sides, double gap_mm = 1e-6);
 
   SurfacePoint at(double u, double v) const;
 

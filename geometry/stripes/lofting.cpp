@@ -11,11 +11,11 @@ namespace moldloft::geometry {
 
 namespace {
 
-std::unexpected<LoftError> failed(Error what, std::ptrdiff_t where) {
-  return std::unexpected(LoftError{what, static_cast<int>(where)});
+std::unexpected<Flaw> failed(Error error, std::ptrdiff_t where) {
+  return std::unexpected(Flaw{error, static_cast<std::size_t>(where)});
 }
 
-std::expected<void, LoftError> check_together(std::span<const SpaceCurve> curves) {
+std::expected<void, Flaw> check_together(std::span<const SpaceCurve> curves) {
   for (std::size_t k = 0; k < curves.size(); ++k) {
     const auto where = static_cast<std::ptrdiff_t>(k);
     if (const auto checked = check(curves[k]); !checked) return failed(checked.error(), where);
@@ -45,7 +45,7 @@ void measure(Loft& loft, std::span<const SpaceCurve> curves) {
 
 }  // namespace
 
-std::expected<std::vector<double>, LoftError> loft_parameters(std::span<const SpaceCurve> curves) {
+std::expected<std::vector<double>, Flaw> loft_parameters(std::span<const SpaceCurve> curves) {
   if (curves.size() < 2) return failed(Error::too_few_points, std::ssize(curves));
   std::vector<double> mean(curves.size(), 0.0);
   int rows = 0;
@@ -69,7 +69,7 @@ std::expected<std::vector<double>, LoftError> loft_parameters(std::span<const Sp
   return mean;
 }
 
-std::expected<Loft, LoftError> loft(std::span<const SpaceCurve> curves, const LoftSettings& settings) {
+std::expected<Loft, Flaw> loft(std::span<const SpaceCurve> curves, const LoftSettings& settings) {
   const int count = static_cast<int>(curves.size());
   const int control_points = settings.control_points > 0 ? settings.control_points : count;
   if (count <= settings.degree || count < control_points) return failed(Error::too_few_points, count);
@@ -80,8 +80,8 @@ std::expected<Loft, LoftError> loft(std::span<const SpaceCurve> curves, const Lo
   return loft(curves, *parameters, balanced_knots(*parameters, control_points, settings.degree), settings);
 }
 
-std::expected<Loft, LoftError> loft(std::span<const SpaceCurve> curves, std::span<const double> parameters,
-                                    std::span<const double> knots_u, const LoftSettings& settings) {
+std::expected<Loft, Flaw> loft(std::span<const SpaceCurve> curves, std::span<const double> parameters,
+                               std::span<const double> knots_u, const LoftSettings& settings) {
   if (curves.size() != parameters.size()) return failed(Error::sizes_differ, std::ssize(parameters));
   const int degree = settings.degree, control_u = static_cast<int>(knots_u.size()) - degree - 1;
   if (const auto checked = check_knots(knots_u, degree, control_u); !checked)

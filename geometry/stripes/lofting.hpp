@@ -11,7 +11,14 @@
 //              p in u comes back.
 // Cost         m p (p + 3 n) for n control points a curve
 // Allocation   what is returned, and the triangle of the equations
-// Failure      LoftError; see there
+// Failure      a Flaw, where it says `where`:
+//
+// too_few_points         fewer curves than control points or than degree + 1 (`where`: how many there are)
+// curves_not_compatible  curve `where` has another degree or other knots than the first (make_compatible())
+// coincident_curves      both ends of curve `where` lie where those of the one before it do
+// span_without_points    control point `where` along u has no curve of its own
+// singular               it hardly has
+// what check() finds in curve `where`
 #pragma once
 
 #include "geometry/error.hpp"
@@ -23,17 +30,6 @@
 #include <vector>
 
 namespace moldloft::geometry {
-
-// too_few_points         fewer curves than control points or than degree + 1 (`where`: how many there are)
-// curves_not_compatible  curve `where` has another degree or other knots than the first (make_compatible())
-// coincident_curves      both ends of curve `where` lie where those of the one before it do
-// span_without_points    control point `where` along u has no curve of its own
-// singular               it hardly has
-// what check() finds in curve `where`
-struct LoftError {
-  Error what;
-  int where = 0;
-};
 
 struct LoftSettings {
   int degree = cubic;             // along u
@@ -50,13 +46,13 @@ struct Loft {
 
 // The mean chord-length parameters of the rows of first and of last points (2.70). A row without length,
 // where all curves meet in one point, has no say.
-std::expected<std::vector<double>, LoftError> loft_parameters(std::span<const SpaceCurve> curves);
+std::expected<std::vector<double>, Flaw> loft_parameters(std::span<const SpaceCurve> curves);
 
 // Knots averaged (interpolation) or balanced (approximation) over the u_k.
-std::expected<Loft, LoftError> loft(std::span<const SpaceCurve> curves, const LoftSettings& settings = {});
+std::expected<Loft, Flaw> loft(std::span<const SpaceCurve> curves, const LoftSettings& settings = {});
 
 // With parameters (increasing) and knots along u of the caller's choice; settings.control_points has no say.
-std::expected<Loft, LoftError> loft(std::span<const SpaceCurve> curves, std::span<const double> parameters,
-                                    std::span<const double> knots_u, const LoftSettings& settings = {});
+std::expected<Loft, Flaw> loft(std::span<const SpaceCurve> curves, std::span<const double> parameters,
+                               std::span<const double> knots_u, const LoftSettings& settings = {});
 
 }  // namespace moldloft::geometry

@@ -54,9 +54,9 @@ std::expected<void, MatchingFailure> check_tracks(std::span<const double> knots_
                                                   std::span<const SampledTrack> samples) {
   for (const auto knots : {knots_u, knots_v})
     if (const auto good = check_cubic_knots(knots); !good)
-      return std::unexpected(MatchingFailure{.what = good.error()});
+      return std::unexpected(MatchingFailure{.error = good.error()});
   const auto blame = [](Error what, std::size_t stripe) {
-    return std::unexpected(MatchingFailure{.what = what, .stripe = static_cast<int>(stripe)});
+    return std::unexpected(MatchingFailure{.error = what, .stripe = static_cast<int>(stripe)});
   };
   std::vector<Eigen::Vector2d> from, to;
   std::vector<int> straight;

@@ -3,7 +3,7 @@
 namespace moldloft::geometry {
 
 std::string describe(const MatchingFailure& failure) {
-  std::string words{to_string(failure.what)};
+  std::string words{to_string(failure.error)};
   if (failure.stripe >= 0) words += ": stripe " + std::to_string(failure.stripe);
   if (failure.other >= 0) words += ", which is where stripe " + std::to_string(failure.other) + " is";
   if (failure.control.i >= 0)

@@ -13,12 +13,12 @@ struct NetIndex {
 };
 
 struct MatchingFailure {
-  Error what;
+  Error error{};
   int stripe = -1, other = -1;  // the stripe that is wrong, and the one that it coincides with
   NetIndex control{};           // the control point that the stripes leave free
   double condition = 0;         // singular: of the equations, where it was estimated
 };
 
-std::string describe(const MatchingFailure&);  // "what: stripe 3, which is where stripe 1 is"
+std::string describe(const MatchingFailure&);  // "error: stripe 3, which is where stripe 1 is"
 
 }  // namespace moldloft::geometry

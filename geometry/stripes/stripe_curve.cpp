@@ -12,15 +12,14 @@ std::vector<double> consistent_parameters(std::span<const Eigen::Vector2d> uv, c
   return t;
 }
 
-std::expected<StripeCurve, CurveFitError> fit_stripe(std::span<const Eigen::Vector3d> points,
-                                                     std::span<const Eigen::Vector2d> uv,
-                                                     std::span<const double> knots,
-                                                     StripeParameter parameter) {
-  if (uv.size() != points.size()) return std::unexpected(CurveFitError{Error::sizes_differ});
-  if (points.size() < 2) return std::unexpected(CurveFitError{Error::too_few_points});
+std::expected<StripeCurve, Flaw> fit_stripe(std::span<const Eigen::Vector3d> points,
+                                            std::span<const Eigen::Vector2d> uv,
+                                            std::span<const double> knots, StripeParameter parameter) {
+  if (uv.size() != points.size()) return std::unexpected(Flaw{Error::sizes_differ});
+  if (points.size() < 2) return std::unexpected(Flaw{Error::too_few_points});
   const Eigen::Vector2d from = uv.front(), to = uv.back();
-  if (!from.allFinite() || !to.allFinite()) return std::unexpected(CurveFitError{Error::not_finite});
-  if (from == to) return std::unexpected(CurveFitError{Error::no_length});
+  if (!from.allFinite() || !to.allFinite()) return std::unexpected(Flaw{Error::not_finite});
+  if (from == to) return std::unexpected(Flaw{Error::no_length});
 
   std::vector<double> t;
   if (parameter == StripeParameter::consistent) {

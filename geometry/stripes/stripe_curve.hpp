@@ -8,7 +8,7 @@
 //              the pre-image's length
 // Cost         the curve fit's
 // Allocation   what is returned
-// Failure      CurveFitError: sizes_differ, no_length (the pre-image), what fit_curve() finds (repeated_points:
+// Failure      Flaw: sizes_differ, no_length (the pre-image), what fit_curve() finds (repeated_points:
 //              (u, v) that go backwards along the pre-image)
 #pragma once
 
@@ -40,8 +40,8 @@ struct StripeCurve {
 
 // `uv` has an entry a point; the pre-image is straight from the first to the last. `knots` are clamped
 // on [0, 1].
-std::expected<StripeCurve, CurveFitError> fit_stripe(std::span<const Eigen::Vector3d> points,
-                                                     std::span<const Eigen::Vector2d> uv,
-                                                     std::span<const double> knots, StripeParameter);
+std::expected<StripeCurve, Flaw> fit_stripe(std::span<const Eigen::Vector3d> points,
+                                            std::span<const Eigen::Vector2d> uv,
+                                            std::span<const double> knots, StripeParameter);
 
 }  // namespace moldloft::geometry

@@ -94,17 +94,18 @@ void extend(Line& line, const Candidate& by, int shot, const Stripe& stripe, int
   line.last_stripe = by.stripe;
 }
 
-std::optional<JoinError> what_is_wrong(std::span<const StripesOfShot> shots) {
-  if (shots.empty()) return JoinError{Error::too_few_points};
-  for (int shot = 0; shot < static_cast<int>(shots.size()); ++shot) {
-    if (shots[shot].empty()) return JoinError{Error::too_few_points, shot, 0};
-    for (int s = 0; s < static_cast<int>(shots[shot].size()); ++s) {
-      const Stripe& stripe = shots[shot][s];
-      if (stripe.size() < 2) return JoinError{Error::too_few_points, shot, s};
+std::optional<Flaw> what_is_wrong(std::span<const StripesOfShot> shots) {
+  if (shots.empty()) return Flaw{Error::too_few_points};
+  std::size_t where = 0;
+  for (const StripesOfShot& shot : shots) {
+    if (shot.empty()) return Flaw{Error::too_few_points, where};
+    for (const Stripe& stripe : shot) {
+      if (stripe.size() < 2) return Flaw{Error::too_few_points, where};
       for (std::size_t i = 0; i < stripe.size(); ++i) {
-        if (!stripe[i].allFinite()) return JoinError{Error::not_finite, shot, s};
-        if (i > 0 && stripe[i] == stripe[i - 1]) return JoinError{Error::repeated_points, shot, s};
+        if (!stripe[i].allFinite()) return Flaw{Error::not_finite, where};
+        if (i > 0 && stripe[i] == stripe[i - 1]) return Flaw{Error::repeated_points, where};
       }
+      ++where;
     }
   }
   return std::nullopt;
@@ -112,8 +113,8 @@ std::optional<JoinError> what_is_wrong(std::span<const StripesOfShot> shots) {
 
 }  // namespace
 
-std::expected<JoinedStripes, JoinError> join_stripes(std::span<const StripesOfShot> shots,
-                                                     const JoinSettings& settings) {
+std::expected<JoinedStripes, Flaw> join_stripes(std::span<const StripesOfShot> shots,
+                                                const JoinSettings& settings) {
   if (const auto wrong = what_is_wrong(shots)) return std::unexpected(*wrong);
   std::vector<Line> lines;
   int stripes = 0;

@@ -10,8 +10,9 @@
 // Units        millimetres, radians; world coordinates
 // Cost         every point of a shot is visited once for each line: lines * points a shot
 // Allocation   what is returned, and a table of lines * stripes
-// Failure      JoinError: too_few_points (no shot, a shot without stripes, a stripe of fewer than 2 points),
-//              not_finite, repeated_points. Stripes that find no partner are no error: they are counted.
+// Failure      too_few_points (no shot, a shot without stripes, a stripe of fewer than 2 points), not_finite,
+//              repeated_points, with the stripe, counted through all shots. Stripes that find no partner are no
+//              error: left_over counts them.
 #pragma once
 
 #include "geometry/error.hpp"
@@ -52,12 +53,7 @@ struct JoinedStripes {
   int left_over = 0;  // stripes that are part of none
 };
 
-struct JoinError {
-  Error what;
-  int shot = 0, stripe = 0;
-};
-
-std::expected<JoinedStripes, JoinError> join_stripes(std::span<const StripesOfShot> shots,
-                                                     const JoinSettings& settings = {});
+std::expected<JoinedStripes, Flaw> join_stripes(std::span<const StripesOfShot> shots,
+                                                const JoinSettings& settings = {});
 
 }  // namespace moldloft::geometry

@@ -115,7 +115,7 @@ BSplineSurface graph_surface(const std::vector<double>& knots_u, const std::vect
 BSplineSurface coons_base(const BSplineSurface& surface) {
   const auto patch = CoonsPatch::through({line_along_u(surface, 0), line_along_u(surface, 1),
                                           line_along_v(surface, 0), line_along_v(surface, 1)});
-  if (!patch) give_up(std::string{to_string(patch.error().what)});
+  if (!patch) give_up(std::string{to_string(patch.error().error)});
   return patch->net();
 }
 
@@ -138,7 +138,7 @@ StripeFit fit_stripes(std::span<const SampledStripe> stripes, const std::vector<
   std::vector<SpaceCurve> curves;
   for (const SampledStripe& stripe : stripes) {
     auto curve = fit_stripe(stripe.points, stripe.uv, knots, parameter);
-    if (!curve) give_up(std::string{to_string(curve.error().what)});
+    if (!curve) give_up(std::string{to_string(curve.error().error)});
     tracks.push_back(std::move(curve->track)), curves.push_back(std::move(curve->curve));
   }
   const auto fit = BSplineSurfaceFit::assemble(base.knots_u, base.knots_v, tracks, {}, {.weight = weight});

@@ -44,11 +44,11 @@ BSplineSurface measured_base(std::mt19937& random) {
       points.emplace_back(xy.x(), xy.y(), z);
     }
     const auto curve = fit_curve<3>(points, knots, {.interpolate_ends = true});
-    if (!curve) give_up(std::string{to_string(curve.error().what)});
+    if (!curve) give_up(std::string{to_string(curve.error().error)});
     curves[side] = curve->curve;
   }
   const auto patch = CoonsPatch::through({curves[0], curves[1], curves[2], curves[3]}, 10 * height_noise_mm);
-  if (!patch) give_up(std::string{to_string(patch.error().what)});
+  if (!patch) give_up(std::string{to_string(patch.error().error)});
   return patch->net();
 }
 

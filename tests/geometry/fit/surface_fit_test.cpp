@@ -333,10 +333,16 @@ TEST_CASE(
   const Height flat = [](double, double) { return 700.0; };
   // 49 control points and 100 offsets, counted 1.4 times, are more than 200 points: no net has a finite score.
   SurfaceFit surface_fit({.max_spans_u = 16, .max_spans_v = 16, .max_shots = 128});
-  REQUIRE(fit(surface_fit, map, random_shots(map, flat, 100, 2, 0.05, 0.01, 3)).has_value());
+  const std::vector<Shot> shots = random_shots(map, flat, 100, 2, 0.05, 0.01, 3);
+  REQUIRE(fit(surface_fit, map, shots).has_value());
   CHECK(surface_fit.report().spans_u == 4);
-  CHECK(surface_fit.report().sigma_mm > 0);
-  CHECK(deviation(surface_fit.surface(), flat).max < 1);
+  double squares = 0;
+  for (const Shot& shot : shots) {
+    for (const Vector3d& p : shot.points)
+      squares += std::pow(surface_fit.surface().at(p.x() / 305, p.y() / 305).value.z() - p.z(), 2);
+  }
+  // The true plane is one of the surfaces to choose from, and misses the points by noise and offsets alone.
+  CHECK(std::sqrt(squares / 200) < 2 * std::hypot(0.05, 0.01));
 }
 
 TEST_CASE("when shots outgrow the memory plan they are taken as exact, and counted") {

@@ -128,7 +128,7 @@ TEST_CASE("a point that is not a number is named, and no memory is taken on the 
   const auto failed = measure_deviations(*prepared, known.points, {}, out);
   REQUIRE(!failed);
   CHECK(failed.error().error == Error::not_finite);
-  CHECK(failed.error().point == 37);
+  CHECK(failed.error().where == 37);
 }
 
 TEST_CASE("the summary is what sorting says") {

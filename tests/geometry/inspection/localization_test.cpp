@@ -294,7 +294,7 @@ TEST_CASE("points that cannot be localized are refused by name and index") {
   std::vector<double> negative(50, 1.0);
   negative[20] = -1;
   settings.weights = negative;
-  CHECK(localize(*prepared, points, settings).error().point == 20);
+  CHECK(localize(*prepared, points, settings).error().where == 20);
   CHECK(localize(*prepared, points, settings).error().error == Error::negative_weight);
   std::vector<Vector3d> line;
   for (int i = 0; i < 50; ++i) line.push_back({1.0 * i, 2.0 * i, 3.0 * i});
@@ -302,10 +302,10 @@ TEST_CASE("points that cannot be localized are refused by name and index") {
   points[31].z() = std::nan("");
   const auto failed = localize(*prepared, points);
   CHECK(failed.error().error == Error::not_finite);
-  CHECK(failed.error().point == 31);
+  CHECK(failed.error().where == 31);
   points[31].z() = 1e300;
   CHECK(localize(*prepared, points).error().error == Error::too_large);
-  CHECK(localize(*prepared, points).error().point == 31);
+  CHECK(localize(*prepared, points).error().where == 31);
 }
 
 TEST_CASE("a setting that makes no sense is refused, and what leaves no points over says so") {

@@ -129,7 +129,7 @@ TEST_CASE("where the normal equations break down the condition says so, and QR g
   if (normal.has_value())
     CHECK((normal->control - net).cwiseAbs().maxCoeff() > 1e3 * (qr->control - net).cwiseAbs().maxCoeff());
   else
-    CHECK(normal.error().what == Error::singular);
+    CHECK(normal.error().error == Error::singular);
 }
 
 TEST_CASE("stripes that leave a Bezier surface free are refused by name") {
@@ -143,16 +143,16 @@ TEST_CASE("stripes that leave a Bezier surface free are refused by name") {
     REQUIRE(!fit.has_value());
     return fit.error();
   };
-  CHECK(with([](auto& s) { s.resize(2); }).what == Error::too_few_stripes);
-  CHECK(with([](auto& s) { s.clear(); }).what == Error::too_few_stripes);
+  CHECK(with([](auto& s) { s.resize(2); }).error == Error::too_few_stripes);
+  CHECK(with([](auto& s) { s.clear(); }).error == Error::too_few_stripes);
   auto failure = with([&](auto& s) { s[4].control(1, 2) = nan; });
-  CHECK(failure.what == Error::not_finite);
+  CHECK(failure.error == Error::not_finite);
   CHECK(failure.stripe == 4);
-  CHECK(with([](auto& s) { s[5].to = s[5].from; }).what == Error::no_length);
-  CHECK(with([](auto& s) { s[5].to.x() = 1.01; }).what == Error::preimage_outside);
-  CHECK(with([](auto& s) { s[5].control = MatrixX3d::Zero(8, 3); }).what == Error::too_few_points);
+  CHECK(with([](auto& s) { s[5].to = s[5].from; }).error == Error::no_length);
+  CHECK(with([](auto& s) { s[5].to.x() = 1.01; }).error == Error::preimage_outside);
+  CHECK(with([](auto& s) { s[5].control = MatrixX3d::Zero(8, 3); }).error == Error::too_few_points);
   failure = with([](auto& s) { s[7].from = s[2].to, s[7].to = s[2].from; });
-  CHECK(failure.what == Error::coincident_stripes);
+  CHECK(failure.error == Error::coincident_stripes);
   CHECK(failure.stripe == 7);
   CHECK(failure.other == 2);
 
@@ -163,7 +163,7 @@ TEST_CASE("stripes that leave a Bezier surface free are refused by name") {
   for (const LeastSquares method : {LeastSquares::qr, LeastSquares::normal_equations}) {
     const auto fit = fit_bezier_surface(parallel, {.method = method});
     REQUIRE(!fit.has_value());
-    CHECK(fit.error().what == Error::singular);
+    CHECK(fit.error().error == Error::singular);
     CHECK(fit.error().control.i >= 0);
     if (method == LeastSquares::qr) CHECK(fit.error().condition > 1e13);
     CHECK(fit.error().control.j >= 0);

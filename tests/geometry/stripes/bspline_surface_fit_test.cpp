@@ -319,7 +319,7 @@ TEST_CASE("eight parallel stripes do not determine nine rows of control points, 
   };
   const auto eight = assemble(8);
   REQUIRE(!eight.has_value());
-  CHECK(eight.error().what == Error::singular);
+  CHECK(eight.error().error == Error::singular);
   CHECK(eight.error().control.i >= 1);
   CHECK(eight.error().control.i <= 9);
   CHECK(assemble(9).has_value());
@@ -338,7 +338,7 @@ TEST_CASE("one point too few is singular, whichever way the last pivot is rounde
     const std::vector<SampledTrack> tracks{track};
     const auto fit = BSplineSurfaceFit::assemble(one_span, one_span, {}, tracks, {.ring = Ring::unknown});
     REQUIRE(!fit.has_value());
-    CHECK(fit.error().what == Error::singular);
+    CHECK(fit.error().error == Error::singular);
   }
 }
 
@@ -349,7 +349,7 @@ TEST_CASE("a control point that no stripe reaches is named") {
   for (int s = 0; s < 16; ++s) add_isoline(truth, true, s / 32.0, stripes);
   const auto fit = BSplineSurfaceFit::assemble(knots, knots, stripes.tracks);
   REQUIRE(!fit.has_value());
-  CHECK(fit.error().what == Error::singular);
+  CHECK(fit.error().error == Error::singular);
   CHECK(fit.error().control.i >= 7);
   CHECK(describe(fit.error()).starts_with("the data do not determine the surface: control point ("));
 }
@@ -364,50 +364,50 @@ TEST_CASE("a stripe that is wrong is named with what is wrong") {
     return what_is_wrong(stripes);
   };
   auto failure = with([](Stripes& s) { s.tracks[3].preimage.uv[1] = s.tracks[3].preimage.uv[0]; });
-  CHECK(failure.what == Error::no_length);
+  CHECK(failure.error == Error::no_length);
   CHECK(failure.stripe == 3);
   failure = with([](Stripes& s) { s.tracks[5].preimage.uv[1].x() = 1.5; });
-  CHECK(failure.what == Error::preimage_outside);
+  CHECK(failure.error == Error::preimage_outside);
   CHECK(failure.stripe == 5);
   failure = with([&](Stripes& s) { s.tracks[2].preimage.uv[0].y() = nan; });
-  CHECK(failure.what == Error::not_finite);
+  CHECK(failure.error == Error::not_finite);
   CHECK(failure.stripe == 2);
   failure = with([](Stripes& s) { std::swap(s.tracks[4].knots[4], s.tracks[4].knots[5]); });
-  CHECK(failure.what == Error::knots_not_increasing);
+  CHECK(failure.error == Error::knots_not_increasing);
   CHECK(failure.stripe == 4);
   failure = with([](Stripes& s) {
     s.tracks[9].preimage = straight_preimage({2 / 11.0, 1}, {2 / 11.0, 1e-10});
   });
-  CHECK(failure.what == Error::coincident_stripes);  // with the third, walked the other way
+  CHECK(failure.error == Error::coincident_stripes);  // with the third, walked the other way
   CHECK(failure.stripe == 9);
   CHECK(failure.other == 2);
   CHECK(describe(failure) ==
         "two stripes lie on the same line of the surface: stripe 9, which is where stripe 2 is");
   failure = what_is_wrong(good, {{{{0.5, 0.5}}, {}}, {{{0.5, 1.5}}, {}}});
-  CHECK(failure.what == Error::preimage_outside);
+  CHECK(failure.error == Error::preimage_outside);
   CHECK(failure.stripe == 13);
-  CHECK(what_is_wrong({}).what == Error::too_few_stripes);
+  CHECK(what_is_wrong({}).error == Error::too_few_stripes);
   Stripes one = good;
   one.tracks.resize(1);
   one.tracks[0].knots = one_span;
   one.tracks[0].preimage = straight_preimage({0.3, 0.3}, {0.4, 0.4});  // one piece, seven equations
-  CHECK(what_is_wrong(one).what == Error::too_few_stripes);
-  CHECK(BSplineSurfaceFit::assemble({0, 0, 0, 0, 2, 1, 3, 3, 3, 3}, even, good.tracks).error().what ==
+  CHECK(what_is_wrong(one).error == Error::too_few_stripes);
+  CHECK(BSplineSurfaceFit::assemble({0, 0, 0, 0, 2, 1, 3, 3, 3, 3}, even, good.tracks).error().error ==
         Error::knots_not_increasing);
 
   const auto fit = BSplineSurfaceFit::assemble(even, even, good.tracks);
   REQUIRE(fit.has_value());
   auto data = good.curves;
   data[7].control[2].y() = nan;
-  CHECK(fit->solve(data, {}, truth).error().what == Error::not_finite);
+  CHECK(fit->solve(data, {}, truth).error().error == Error::not_finite);
   CHECK(fit->solve(data, {}, truth).error().stripe == 7);
   data[7].control.pop_back();
-  CHECK(fit->solve(data, {}, truth).error().what == Error::too_few_points);
+  CHECK(fit->solve(data, {}, truth).error().error == Error::too_few_points);
   data = good.curves;
   data[6].knots[4] += 0.01;
-  CHECK(fit->solve(data, {}, truth).error().what == Error::curves_not_compatible);
+  CHECK(fit->solve(data, {}, truth).error().error == Error::curves_not_compatible);
   CHECK(fit->solve(data, {}, truth).error().stripe == 6);
   data.pop_back();
-  CHECK(fit->solve(data, {}, truth).error().what == Error::too_few_points);
-  CHECK(fit->solve(good.curves, {}, random_surface(uneven, even)).error().what == Error::too_few_points);
+  CHECK(fit->solve(data, {}, truth).error().error == Error::too_few_points);
+  CHECK(fit->solve(good.curves, {}, random_surface(uneven, even)).error().error == Error::too_few_points);
 }

@@ -181,8 +181,8 @@ TEST_CASE("what is wrong with curves to be lofted is named, and which of them") 
     curves.push_back(numbers.curve<3>(3, 0, 1));
     for (auto& p : curves.back().control) p.x() += 10 * k;
   }
-  const auto is = [](const auto& lofted, Error what, int where) {
-    return !lofted.has_value() && lofted.error().what == what && lofted.error().where == where;
+  const auto is = [](const auto& lofted, Error what, std::size_t where) {
+    return !lofted.has_value() && lofted.error().error == what && lofted.error().where == where;
   };
   CHECK(loft(curves).has_value());
   CHECK(is(loft(std::span{curves}.first(3)), Error::too_few_points, 3));

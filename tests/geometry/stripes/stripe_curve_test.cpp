@@ -67,15 +67,15 @@ TEST_CASE("a stripe without a pre-image or that goes back on it is refused by na
   const auto knots = uniform_clamped_knots(2);
   auto uv = stripe.uv;
   uv.back() = uv.front();
-  CHECK(fit_stripe(stripe.points, uv, knots, StripeParameter::consistent).error().what == Error::no_length);
+  CHECK(fit_stripe(stripe.points, uv, knots, StripeParameter::consistent).error().error == Error::no_length);
   uv = stripe.uv;
   std::swap(uv[7], uv[12]);
-  CHECK(fit_stripe(stripe.points, uv, knots, StripeParameter::consistent).error().what ==
+  CHECK(fit_stripe(stripe.points, uv, knots, StripeParameter::consistent).error().error ==
         Error::repeated_points);
   uv.front().x() = NAN;
-  CHECK(fit_stripe(stripe.points, uv, knots, StripeParameter::consistent).error().what == Error::not_finite);
+  CHECK(fit_stripe(stripe.points, uv, knots, StripeParameter::consistent).error().error == Error::not_finite);
   stripe.points[4] = stripe.points[3];
-  CHECK(fit_stripe(stripe.points, stripe.uv, knots, StripeParameter::chord_length).error().what ==
+  CHECK(fit_stripe(stripe.points, stripe.uv, knots, StripeParameter::chord_length).error().error ==
         Error::repeated_points);
-  CHECK(fit_stripe({}, {}, knots, StripeParameter::chord_length).error().what == Error::too_few_points);
+  CHECK(fit_stripe({}, {}, knots, StripeParameter::chord_length).error().error == Error::too_few_points);
 }

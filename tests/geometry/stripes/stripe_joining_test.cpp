@@ -127,19 +127,18 @@ TEST_CASE("what is wrong with stripes is named, and where") {
   const std::vector<StripesOfShot> good{shot(0, 100, 3), shot(101, 200, 3)};
   const auto error = [](const std::vector<StripesOfShot>& shots) {
     const auto joined = join_stripes(shots);
-    return joined ? std::tuple{Error::capacity, -1, -1}
-                  : std::tuple{joined.error().what, joined.error().shot, joined.error().stripe};
+    return joined ? Flaw{Error::capacity} : joined.error();
   };
-  CHECK((error({}) == std::tuple{Error::too_few_points, 0, 0}));
+  CHECK((error({}) == Flaw{Error::too_few_points, 0}));
   auto bad = good;
   bad[1].clear();
-  CHECK((error(bad) == std::tuple{Error::too_few_points, 1, 0}));
+  CHECK((error(bad) == Flaw{Error::too_few_points, 3}));
   bad = good, bad[1][2].resize(1);
-  CHECK((error(bad) == std::tuple{Error::too_few_points, 1, 2}));
+  CHECK((error(bad) == Flaw{Error::too_few_points, 3 + 2}));
   bad = good, bad[0][1][4].z() = std::nan("");
-  CHECK((error(bad) == std::tuple{Error::not_finite, 0, 1}));
+  CHECK((error(bad) == Flaw{Error::not_finite, 1}));
   bad = good, bad[1][0][7] = bad[1][0][6];
-  CHECK((error(bad) == std::tuple{Error::repeated_points, 1, 0}));
+  CHECK((error(bad) == Flaw{Error::repeated_points, 3}));
   CHECK(join_stripes(std::span{good}.first(1))->lines.size() == 3);  // one shot is all lines
 }
 
