@@ -94,7 +94,7 @@ std::expected<void, Flaw> NetSearch::start(const MomentGrid& points, const NetTa
     first_ = 0;
     return fail(Error::too_few_points, model.totals.points);
   }
-  search_in(0, candidates_.size(), Phase::merge);
+  search_in(1, candidates_.size(), Phase::merge);
   return {};
 }
 
@@ -130,10 +130,11 @@ void NetSearch::solve_again() {
   search_in(chosen_, chosen_ + 1, Phase::start);
 }
 
-// Cells, then the shots' cells, into those of the net at hand; true when all are merged.
+// The cells of all nets, each one's from those of the next finer one; true when all are merged. Alternating with the
+// solutions would find the caches cold.
 bool NetSearch::merge_some(double budget) {
-  MomentGrid& to = *candidates_[at_].merged;
-  if (cell_ < to.cell_count()) {
+  for (; at_ < end_ && candidates_[at_].merged; ++at_, cell_ = 0) {
+    MomentGrid& to = *candidates_[at_].merged;
     const auto left = static_cast<std::size_t>(to.cell_count() - cell_);
     const int end = cell_ + static_cast<int>(room_for(left, merge_cost, budget, work_));
     to.merge_cells(cell_, end, grid(candidates_[at_ - 1]));
@@ -141,12 +142,12 @@ bool NetSearch::merge_some(double budget) {
     cell_ = end;
     if (cell_ < to.cell_count()) return false;
   }
-  if (shots_ != nullptr && !merge_shots(budget)) return false;
-  cell_ = shot_ = 0;
   return true;
 }
 
+// The shots' cells into those of the net at hand; true when all are merged.
 bool NetSearch::merge_shots(double budget) {
+  if (shots_ == nullptr || at_ == 0) return true;
   const MomentGrid& to = *candidates_[at_].merged;
   while (shot_ < shots_->count()) {
     if (shot_cell_ == 0) shot_cells_ = shots_->cells_of(shot_);
@@ -159,6 +160,7 @@ bool NetSearch::merge_shots(double budget) {
     ++shot_, shot_cell_ = 0;
   }
   shots_->coarsened(to);
+  shot_ = 0;
   return true;
 }
 
@@ -196,7 +198,12 @@ std::expected<bool, Flaw> NetSearch::step(double budget, double spent) {
 std::expected<bool, Flaw> NetSearch::piece(double budget) {
   switch (phase_) {
     case Phase::merge:
-      full_ = at_ > 0 && !merge_some(budget);
+      full_ = !merge_some(budget);
+      if (full_) return false;
+      at_ = 0, phase_ = Phase::merge_shots;
+      [[fallthrough]];
+    case Phase::merge_shots:
+      full_ = !merge_shots(budget);
       if (full_) return false;
       if (at_ < first_) return ++at_, false;
       [[fallthrough]];
@@ -219,7 +226,7 @@ std::expected<bool, Flaw> NetSearch::piece(double budget) {
     }
     case Phase::score:
       take_score();
-      if (++at_ < end_) return phase_ = Phase::merge, false;
+      if (++at_ < end_) return phase_ = Phase::merge_shots, false;
       chosen_ = first_ + choose_net(scores(), settings_.criterion, settings_.tolerance);
       phase_ = Phase::done;
       return true;
@@ -242,7 +249,7 @@ std::expected<void, Flaw> NetSearch::finish() {
 // A net costs unknowns^2, near enough: sixteen times the next one.
 double NetSearch::progress() const {
   if (phase_ == Phase::done) return 1;
-  if (phase_ == Phase::failed) return 0;
+  if (phase_ == Phase::failed || phase_ == Phase::merge) return 0;
   double all = 0, done = 0;
   for (std::size_t k = 0; k < candidates_.size(); ++k) {
     const double unknowns = candidates_[k].net.unknowns(), cost = unknowns * unknowns;

@@ -75,7 +75,7 @@ class NetSearch {
   std::size_t bytes() const;
 
  private:
-  enum class Phase { merge, start, solve, score, done, failed };
+  enum class Phase { merge, merge_shots, start, solve, score, done, failed };
 
   static std::vector<NetCandidate> candidates_of(SplineNet finest, bool nested);
   static NetSolver solver_for(std::span<const NetCandidate>, const NetSearchSettings&, double points);
