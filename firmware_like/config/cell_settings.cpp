@@ -43,7 +43,8 @@ int surface_shots(const CellConfig& c) {
 // A power of two, no span shorter than asked for.
 int finest_spans(double length_mm, double span_mm) {
   const auto wanted = static_cast<unsigned>(std::max(length_mm / span_mm, 1.0));
-  return static_cast<int>(std::clamp(std::bit_floor(wanted), 8u, 256u));
+  return static_cast<int>(std::clamp<unsigned>(std::bit_floor(wanted), geometry::fewest_finest_spans,
+                                               geometry::most_finest_spans));
 }
 
 }  // namespace
@@ -117,6 +118,7 @@ tasks::SurfaceTaskSettings surface_settings(const CellConfig& c) {
   const double shorter = std::min(c.plate.largest_x_mm, c.plate.largest_y_mm);
   s.fit.max_spans_u = finest_spans(longer, c.finest_span_mm);
   s.fit.max_spans_v = finest_spans(shorter, c.finest_span_mm);
+  s.fit.finest_span_mm = c.finest_span_mm;
   s.fit.max_shots = static_cast<int>(s.max_boundary_shots + cell.max_surface_shots);
   s.fit.tolerance_mm = c.fit_tolerance_mm;
   s.fit.shot_sigma_mm = c.robot.repeatability_z_mm;

@@ -6,6 +6,7 @@
 #include "firmware_like/results/sight_map.hpp"
 #include "firmware_like/results/surface_swing.hpp"
 #include "geometry/edges/outline_check.hpp"
+#include "geometry/fit/net_choice.hpp"
 #include "geometry/fit/plan_map.hpp"
 #include "tasks/planning/outline_words.hpp"
 
@@ -431,20 +432,29 @@ void Audit::check_memory() {
 }
 
 void Audit::check_net() {
+  const auto& fit = plate_.fit;
+  if (fit.finest_spans_u == 0 || fit.finest_spans_v == 0) return;  // from before it was kept
   const auto side = [&](std::size_t i) {
     return (plate_.outline.corners[(i + 1) % 4] - plate_.outline.corners[i]).norm();
   };
-  const double span = std::max(std::max(side(0), side(2)) / r_.promised.finest_spans_u,
-                               std::max(side(1), side(3)) / r_.promised.finest_spans_v);
+  const double span = std::max(std::max(side(0), side(2)) / fit.finest_spans_u,
+                               std::max(side(1), side(3)) / fit.finest_spans_v);
   // Numbers of spans are powers of two.
   if (span <= 2.02 * r_.promised.finest_span_mm) return;
+  const double halved =
+      4.0 * fit.finest_spans_u * fit.finest_spans_v;  // cells of the next net, about its unknowns
+  const char* const remedy =
+      static_cast<double>(fit.points_used) < geometry::points_an_unknown * halved
+          ? "the plate's points are too few for a finer one: more stripes, or more points a stripe"
+      : std::max(fit.finest_spans_u, fit.finest_spans_v) >= geometry::most_finest_spans
+          ? "a net has 256 spans at most: state a longer one"
+          : "raise [plate] largest_mm";
   add({.kind = FindingKind::net,
        .place = {},
        .size_mm = span,
-       .text = fmt::format(
-           "the finest net tried has spans of {:.1f} mm; [fit] finest_span_mm asks for {:g}: raise "
-           "[plate] largest_mm",
-           span, r_.promised.finest_span_mm)});
+       .text =
+           fmt::format("the finest net tried has spans of {:.1f} mm; [fit] finest_span_mm asks for {:g}: {}",
+                       span, r_.promised.finest_span_mm, remedy)});
 }
 
 }  // namespace

@@ -76,7 +76,6 @@ struct Promise {
   double noise_mm = 0.051;            // of a point's height
   double repeatability_z_mm = 0.013;  // of the arm's height from stop to stop
   double finest_span_mm = 10;
-  int finest_spans_u = 32, finest_spans_v = 32;  // what the memory plan has room for
   double largest_unseen = 0.02;  // share of the plate's area without points beyond which it is not measured
 };
 

@@ -24,6 +24,7 @@ void put_measured(Json& j, const RunResult& r) {
       {"corners_mm", corners}, {"rms_mm", rounded(plate.outline.rms_mm)}, {"edge_points", r.edge_points}};
   const auto& fit = plate.fit;
   j["surface"] = {{"control_points", {plate.surface.control_u(), plate.surface.control_v()}},
+                  {"finest_spans", {fit.finest_spans_u, fit.finest_spans_v}},
                   {"rms_residual_mm", rounded(fit.rms_residual_mm)},
                   {"sigma_mm", rounded(fit.sigma_mm)},
                   {"tolerance_mm", plate.tolerance_mm},
@@ -48,6 +49,8 @@ MeasuredPlate read_measured(const Json& j) {
   // Until surface.json is read its net is known by its size.
   const Eigen::Index rows = surface.at("control_points").at(0), columns = surface.at("control_points").at(1);
   for (auto* net : {&plate.surface.x, &plate.surface.y, &plate.surface.z}) net->setZero(rows, columns);
+  const Json finest = surface.value("finest_spans", Json{0, 0});  // unknown of runs from before it was kept
+  fit.finest_spans_u = finest.at(0), fit.finest_spans_v = finest.at(1);
   fit.rms_residual_mm = surface.at("rms_residual_mm");
   fit.sigma_mm = surface.at("sigma_mm");
   plate.tolerance_mm = surface.at("tolerance_mm");

@@ -12,6 +12,11 @@ void MomentGrid::clear(int first, int end) {
   std::fill(counts_.begin() + first, counts_.begin() + end, 0u);
 }
 
+void MomentGrid::reshape(int cells_u, int cells_v) {
+  assert(static_cast<std::size_t>(cells_u) * cells_v <= cells_.size());
+  cells_u_ = cells_u, cells_v_ = cells_v;
+}
+
 void MomentGrid::merge_cells(int first, int end, const MomentGrid& fine) {
   const int halves_u = fine.cells_u_ / cells_u_, halves_v = fine.cells_v_ / cells_v_;
   assert(halves_u * cells_u_ == fine.cells_u_ && halves_u <= 2);
@@ -103,7 +108,7 @@ void MomentGrid::merge_blocks(const MomentGrid& fine, std::span<const int> at_u,
 
 void MomentGrid::add(const MomentGrid& other) {
   assert(other.cells_u_ == cells_u_ && other.cells_v_ == cells_v_);
-  for (std::size_t k = 0; k < cells_.size(); ++k) {
+  for (int k = 0; k < cell_count(); ++k) {
     for (std::size_t m = 0; m < 56; ++m) cells_[k].gram[m] += other.cells_[k].gram[m];
     for (std::size_t m = 0; m < 16; ++m) cells_[k].load[m] += other.cells_[k].load[m];
     counts_[k] += other.counts_[k];
@@ -113,7 +118,7 @@ void MomentGrid::add(const MomentGrid& other) {
 // A cell that has lost all its points is exactly empty again; what rounding left is not taken for data.
 void MomentGrid::subtract(const MomentGrid& other) {
   assert(other.cells_u_ == cells_u_ && other.cells_v_ == cells_v_);
-  for (std::size_t k = 0; k < cells_.size(); ++k) {
+  for (int k = 0; k < cell_count(); ++k) {
     assert(counts_[k] >= other.counts_[k]);
     counts_[k] -= other.counts_[k];
     if (counts_[k] == 0) {

@@ -5,14 +5,17 @@
 //
 // Cost         add: 56 + 16 multiply-adds (the plain form; moment_kernel.hpp has the fast
 //              one); merge: moment_kernel.hpp
+// Memory       what was not written is not touched
 // Allocation   in the constructor only
 #pragma once
 
 #include "geometry/splines/bernstein.hpp"
+#include "geometry/unwritten.hpp"
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -50,8 +53,11 @@ struct alignas(64) CellMoments {
 
 class MomentGrid {
  public:
-  MomentGrid(int cells_u, int cells_v)
-      : cells_u_(cells_u), cells_v_(cells_v), cells_(cells_u * cells_v), counts_(cells_u * cells_v) {}
+  MomentGrid(int cells_u, int cells_v) : MomentGrid(unwritten(cells_u, cells_v)) { clear(); }
+  // For a grid that is cleared later, or filled by merging: no cell holds anything yet.
+  static MomentGrid unwritten(int cells_u, int cells_v) { return {cells_u, cells_v, Empty{}}; }
+  // Other cells, no more than the grid was made with; no cell holds anything then.
+  void reshape(int cells_u, int cells_v);
 
   int cells_u() const { return cells_u_; }
   int cells_v() const { return cells_v_; }
@@ -82,9 +88,16 @@ class MomentGrid {
   }
 
  private:
+  struct Empty {};
+  MomentGrid(int cells_u, int cells_v, Empty)
+      : cells_u_(cells_u),
+        cells_v_(cells_v),
+        cells_(static_cast<std::size_t>(cells_u) * cells_v),
+        counts_(static_cast<std::size_t>(cells_u) * cells_v) {}
+
   int cells_u_, cells_v_;
-  std::vector<CellMoments> cells_;
-  std::vector<std::uint32_t> counts_;
+  std::vector<CellMoments, Unwritten<std::allocator<CellMoments>>> cells_;
+  std::vector<std::uint32_t, Unwritten<std::allocator<std::uint32_t>>> counts_;
 };
 
 // out[p][q] += sum_lm Ru[p][l] in[l][m] Rv[q][m]: a cell's sums, taken over as part of a larger cell.

@@ -3,6 +3,7 @@
 #include "geometry/fit/shot_offsets.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <utility>
@@ -47,7 +48,7 @@ std::vector<NetCandidate> NetSearch::candidates_of(SplineNet finest, bool nested
   nets.push_back({.net = std::move(finest)});
   while (nested && (u > fewest_spans || v > fewest_spans)) {
     u = std::max(u / 2, fewest_spans), v = std::max(v / 2, fewest_spans);
-    nets.push_back({.net = SplineNet(u, v), .merged = MomentGrid(u, v)});
+    nets.push_back({.net = SplineNet(u, v), .merged = MomentGrid::unwritten(u, v)});
   }
   for (NetCandidate& c : nets) c.coefficients.reserve(static_cast<std::size_t>(c.net.unknowns()));
   return nets;
@@ -72,10 +73,34 @@ NetSearch::NetSearch(SplineNet finest, const NetSearchSettings& settings, double
     : settings_(settings),
       candidates_(candidates_of(std::move(finest), settings.nested)),
       scores_(candidates_.size()),
-      solver_(solver_for(candidates_, settings, most_points)) {}
+      count_(candidates_.size()),
+      solver_(solver_for(candidates_, settings, most_points)) {
+  if (!settings.shrinks) return;
+  const SplineNet& net = candidates_.front().net;
+  for (int spans = fewest_spans; spans <= std::max(net.cells_u(), net.cells_v()); spans *= 2)
+    tables_.push_back(std::make_shared<const SpanTable>(uniform_clamped_knots(spans)));
+}
+
+// Each candidate is no larger than the one that its place was made for.
+void NetSearch::shrink_to(int spans_u, int spans_v) {
+  const auto table = [&](int spans) {
+    const auto place =
+        static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(spans / fewest_spans)));
+    return tables_[place];
+  };
+  count_ = 0;
+  for (int u = spans_u, v = spans_v;; u = std::max(u / 2, fewest_spans), v = std::max(v / 2, fewest_spans)) {
+    NetCandidate& c = candidates_[count_++];
+    c.net = SplineNet(table(u), table(v));
+    if (c.merged) c.merged->reshape(u, v);
+    if (u == fewest_spans && v == fewest_spans) break;
+  }
+  chosen_ = first_ = 0, phase_ = Phase::done;
+}
 
 std::size_t NetSearch::bytes() const {
   std::size_t sum = solver_.bytes() + scores_.capacity() * sizeof(NetScore);
+  for (const auto& table : tables_) sum += table->bytes();
   for (const NetCandidate& c : candidates_) {
     sum += sizeof c + c.net.bytes() + c.coefficients.capacity() * sizeof(double);
     if (c.merged) sum += c.merged->bytes();
@@ -89,12 +114,12 @@ std::expected<void, Flaw> NetSearch::start(const MomentGrid& points, const NetTa
   points_ = &points, model_ = model, shots_ = shots;
   const double count = static_cast<double>(model.totals.points);
   first_ = 0;
-  while (first_ < candidates_.size() && !determined(candidates_[first_], settings_, count)) ++first_;
-  if (first_ == candidates_.size() || !(model.totals.weight > 0)) {
+  while (first_ < count_ && !determined(candidates_[first_], settings_, count)) ++first_;
+  if (first_ == count_ || !(model.totals.weight > 0)) {
     first_ = 0;
     return fail(Error::too_few_points, model.totals.points);
   }
-  search_in(1, candidates_.size(), Phase::merge);
+  search_in(1, count_, Phase::merge);
   return {};
 }
 
@@ -109,7 +134,7 @@ std::unexpected<Flaw> NetSearch::fail(Error error, std::size_t where) {
 }
 
 void NetSearch::also_try(SplineNet net, std::span<const int> at_u, std::span<const int> at_v) {
-  assert(phase_ == Phase::done && model_.boundary.empty());
+  assert(phase_ == Phase::done && model_.boundary.empty() && !settings_.shrinks);
   MomentGrid merged(net.cells_u(), net.cells_v());
   merged.merge_blocks(*points_, at_u, at_v);
   // It may have more unknowns than the nested nets that the points determine.
@@ -118,10 +143,11 @@ void NetSearch::also_try(SplineNet net, std::span<const int> at_u, std::span<con
     solver_.want_norm(settings_.norm);
   }
   std::size_t place = first_;
-  while (place < candidates_.size() && candidates_[place].net.unknowns() >= net.unknowns()) ++place;
+  while (place < count_ && candidates_[place].net.unknowns() >= net.unknowns()) ++place;
   const auto offset = static_cast<std::ptrdiff_t>(place);
   candidates_.insert(candidates_.begin() + offset, {.net = std::move(net), .merged = std::move(merged)});
   scores_.insert(scores_.begin() + offset, NetScore{});
+  ++count_;
   search_in(place, place + 1, Phase::start);
 }
 
@@ -251,7 +277,7 @@ double NetSearch::progress() const {
   if (phase_ == Phase::done) return 1;
   if (phase_ == Phase::failed || phase_ == Phase::merge) return 0;
   double all = 0, done = 0;
-  for (std::size_t k = 0; k < candidates_.size(); ++k) {
+  for (std::size_t k = 0; k < count_; ++k) {
     const double unknowns = candidates_[k].net.unknowns(), cost = unknowns * unknowns;
     all += cost;
     if (k < at_) done += cost;

@@ -6,6 +6,7 @@
 // Model        net_solver.hpp; the choice net_choice.hpp
 // Work         step() does about `budget` multiply-adds; how it is cut into steps changes coefficients not at all and
 //              residuals in their last digits only
+// Memory       what a net that shrank does not need is not touched
 // Allocation   in the constructor; afterwards in also_try() only
 // Failure      too_few_points with their number; empty_cells with the first such cell, where nothing fairs the surface
 //              over it; singular with the control point; capacity and too_large as in net_solver.hpp
@@ -17,6 +18,7 @@
 
 #include <expected>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -28,7 +30,8 @@ struct NetSearchSettings {
   double points_an_unknown = geometry::points_an_unknown;  // that a net must have to be tried
   NetCriterion criterion = NetCriterion::gcv;
   double tolerance = 0;
-  bool norm = false;  // take the matrices' norms for an estimate of the condition
+  bool shrinks = false;  // shrink_to() may be called
+  bool norm = false;     // take the matrices' norms for an estimate of the condition
 };
 
 // One net over the points.
@@ -48,6 +51,9 @@ class NetSearch {
   NetSearch(SplineNet finest, const NetSearchSettings&,
             double most_points = std::numeric_limits<double>::infinity());
 
+  // From now on the finest net has these spans, powers of two, no more of them than the constructor was told; its
+  // longer direction may be the other one.
+  void shrink_to(int spans_u, int spans_v);
   // A search over `points`, which has the finest net's cells, and must stay as it is, like the shots. The model's
   // net and moments are filled in for every candidate, its noise from the finest where it is not given.
   std::expected<void, Flaw> start(const MomentGrid& points, const NetTask& model, ShotOffsets* = nullptr);
@@ -64,10 +70,10 @@ class NetSearch {
   void solve_again();
 
   // What was tried, from fine to coarse.
-  std::span<const NetScore> scores() const { return std::span(scores_).subspan(first_); }
+  std::span<const NetScore> scores() const { return std::span(scores_).subspan(first_, count_ - first_); }
   std::size_t chosen_score() const { return chosen_ - first_; }  // its place among them
   // The finest candidate is the first, tried or not.
-  std::span<const NetCandidate> candidates() const { return candidates_; }
+  std::span<const NetCandidate> candidates() const { return std::span(candidates_).first(count_); }
   std::size_t chosen_place() const { return chosen_; }
   const NetCandidate& chosen() const { return candidates_[chosen_]; }
   const NetScore& score() const { return scores_[chosen_]; }  // of the chosen one
@@ -90,8 +96,10 @@ class NetSearch {
   void take_score();
 
   NetSearchSettings settings_;
-  std::vector<NetCandidate> candidates_;  // from fine to coarse
-  std::vector<NetScore> scores_;          // of the candidates
+  std::vector<NetCandidate> candidates_;                  // from fine to coarse
+  std::vector<NetScore> scores_;                          // of the candidates
+  std::size_t count_ = 0;                                 // of the candidates that are in use
+  std::vector<std::shared_ptr<const SpanTable>> tables_;  // of 4, 8, 16 and so on spans, where it shrinks
   NetSolver solver_;
   const MomentGrid* points_ = nullptr;
   ShotOffsets* shots_ = nullptr;

@@ -1,6 +1,7 @@
 #include "geometry/fit/shot_offsets.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 namespace moldloft::geometry {
@@ -18,8 +19,8 @@ int blocks_for(int shots) {
 
 ShotOffsets::ShotOffsets(int max_shots, int cells_u, int cells_v, std::size_t max_shot_cells,
                          std::size_t max_unknowns)
-    : cells_u_(cells_u),
-      cells_v_(cells_v),
+    : level_u_(cells_u),
+      level_v_(cells_v),
       slot_of_shot_(max_shots, -1),
       place_of_cell_(static_cast<std::size_t>(cells_u) * cells_v, -1),
       columns_(max_unknowns * columns_for(max_shots)),
@@ -43,12 +44,13 @@ std::size_t ShotOffsets::bytes() const {
              sizeof(double);
 }
 
-void ShotOffsets::clear() {
+void ShotOffsets::clear(int cells_u, int cells_v) {
+  assert(static_cast<std::size_t>(cells_u) * cells_v <= place_of_cell_.size());
   leave_shot();
   std::fill(slot_of_shot_.begin(), slot_of_shot_.end(), -1);
   slots_.clear(), cells_.clear();
   exact_ = 0;
-  level_u_ = cells_u_, level_v_ = cells_v_;
+  level_u_ = cells_u, level_v_ = cells_v;
 }
 
 void ShotOffsets::leave_shot() {
@@ -154,7 +156,7 @@ void ShotOffsets::start(const SplineNet& net) {
     slots_[order_[k]].column = k + 1;
     if ((k + 1) % 8 == 0) first_row_[(k + 1) / 8] = slots_[order_[k]].first_row / band_panel * band_panel;
   }
-  std::fill(blocks_.begin(), blocks_.end(), 0.0);
+  std::fill_n(blocks_.begin(), 64 * blocks_for(count()), 0.0);
 }
 
 void ShotOffsets::clear_rows(int first, int end) {

@@ -12,10 +12,12 @@
 //              its first shot does
 // Memory       a shot's moments are kept only for the cells that it touches; when the plan is full, the
 //              shot at hand and those after it are taken as exact and counted
+//              Room that the shots and the net at hand do not need is not touched
 // Allocation   in the constructor only
 #pragma once
 
 #include "geometry/fit/spline_net.hpp"
+#include "geometry/unwritten.hpp"
 
 #include <Eigen/Core>
 
@@ -29,7 +31,8 @@ class ShotOffsets {
  public:
   ShotOffsets(int max_shots, int cells_u, int cells_v, std::size_t max_shot_cells, std::size_t max_unknowns);
 
-  void clear();
+  // Over these cells, no more than the constructor was told.
+  void clear(int cells_u, int cells_v);
   // All points of one shot come before those of the next. The block's shot rows must have been wanted.
   void add(int shot, const PointBlock&);
   void finish_adding();  // before anything below
@@ -87,7 +90,6 @@ class ShotOffsets {
   void give_up(Slot&);
   double gram(int column_a, int column_b) const;
 
-  int cells_u_, cells_v_;          // of the finest net
   int level_u_ = 0, level_v_ = 0;  // of the net that the cells have been merged for
   std::size_t unknowns_ = 0;
   int row_length_ = 8;
@@ -99,7 +101,7 @@ class ShotOffsets {
   std::vector<Slot> slots_;
   std::vector<ShotCell> cells_;
   std::vector<int> order_, first_row_;
-  std::vector<double, Eigen::aligned_allocator<double>> columns_, blocks_;
+  std::vector<double, Unwritten<Eigen::aligned_allocator<double>>> columns_, blocks_;
   std::vector<double> offsets_, right_, coupled_;
   Eigen::MatrixXd schur_;
 };

@@ -85,14 +85,14 @@ SpanTable::SpanTable(std::span<const double> knots)
 }
 
 SplineNet::SplineNet(int spans_u, int spans_v)
-    : u_(uniform_clamped_knots(spans_u)), v_(uniform_clamped_knots(spans_v)) {}
+    : SplineNet(uniform_clamped_knots(spans_u), uniform_clamped_knots(spans_v)) {}
 
 SplineNet::SplineNet(std::span<const double> knots_u, std::span<const double> knots_v)
-    : u_(knots_u), v_(knots_v) {}
+    : u_(std::make_shared<const SpanTable>(knots_u)), v_(std::make_shared<const SpanTable>(knots_v)) {}
 
 CellMatrix SplineNet::gram(int cell_u, int cell_v, const CellMoments& moments) const {
   CellMatrix out;
-  const SpanTable::Span &su = u_[cell_u], &sv = v_[cell_v];
+  const SpanTable::Span &su = (*u_)[cell_u], &sv = (*v_)[cell_v];
   if (v_is_fast()) {
     moment_kernel().cell_gram(moments.gram.data(), su.pair_rows, sv.pair_columns, out.data());
     return out;
@@ -106,8 +106,8 @@ CellMatrix SplineNet::gram(int cell_u, int cell_v, const CellMoments& moments) c
 }
 
 CellVector SplineNet::load(int cell_u, int cell_v, std::span<const double, 16> moments) const {
-  const auto& eu = u_[cell_u].extraction;
-  const auto& ev = v_[cell_v].extraction;
+  const auto& eu = (*u_)[cell_u].extraction;
+  const auto& ev = (*v_)[cell_v].extraction;
   CellVector half{}, out{};
   for (int a = 0; a < 4; ++a) {
     for (int i = 0; i < 4; ++i) {
@@ -127,8 +127,8 @@ std::pair<double, double> SplineNet::fairing_factors(double length_u, double len
 }
 
 CellMatrix SplineNet::fairing(int cell_u, int cell_v, double length_u, double length_v) const {
-  const auto& slow = v_is_fast() ? u_[cell_u].roughness : v_[cell_v].roughness;
-  const auto& fast = v_is_fast() ? v_[cell_v].roughness : u_[cell_u].roughness;
+  const auto& slow = v_is_fast() ? (*u_)[cell_u].roughness : (*v_)[cell_v].roughness;
+  const auto& fast = v_is_fast() ? (*v_)[cell_v].roughness : (*u_)[cell_u].roughness;
   const auto [ss, ff] = fairing_factors(length_u, length_v);
   CellMatrix out;
   for (int a = 0, ab = 0; a < 4; ++a) {
@@ -213,7 +213,7 @@ void SplineNet::add_to(BandCholesky& matrix, int cell_u, int cell_v, const CellM
 
 void SplineNet::add_to(std::span<double> vector, int cell_u, int cell_v, const CellVector& cell,
                        std::size_t stride) const {
-  const int i = u_[cell_u].first, j = v_[cell_v].first;
+  const int i = (*u_)[cell_u].first, j = (*v_)[cell_v].first;
   for (int k = 0; k < 16; ++k) vector[index(i + k / 4, j + k % 4) * stride] += cell[k];
 }
 
@@ -252,8 +252,8 @@ double SplineNet::energy(int cell_u, int cell_v, const CellMatrix& cell,
 }
 
 CellVector SplineNet::bezier(std::span<const double> coefficients, int cell_u, int cell_v) const {
-  const auto& eu = u_[cell_u].extraction;
-  const auto& ev = v_[cell_v].extraction;
+  const auto& eu = (*u_)[cell_u].extraction;
+  const auto& ev = (*v_)[cell_v].extraction;
   const CellVector c = gather(coefficients, cell_u, cell_v);
   CellVector half{}, out{};
   for (int a = 0; a < 4; ++a) {
@@ -268,7 +268,7 @@ CellVector SplineNet::bezier(std::span<const double> coefficients, int cell_u, i
 }
 
 CellVector SplineNet::gather(std::span<const double> coefficients, int cell_u, int cell_v) const {
-  const int i = u_[cell_u].first, j = v_[cell_v].first;
+  const int i = (*u_)[cell_u].first, j = (*v_)[cell_v].first;
   CellVector out;
   for (int k = 0; k < 16; ++k) out[k] = coefficients[index(i + k / 4, j + k % 4)];
   return out;

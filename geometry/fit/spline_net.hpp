@@ -16,7 +16,9 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace moldloft::geometry {
@@ -62,17 +64,20 @@ class SplineNet {
  public:
   SplineNet(int spans_u, int spans_v);  // uniform
   SplineNet(std::span<const double> knots_u, std::span<const double> knots_v);
+  // Of directions that other nets may share; without allocation.
+  SplineNet(std::shared_ptr<const SpanTable> u, std::shared_ptr<const SpanTable> v)
+      : u_(std::move(u)), v_(std::move(v)) {}
 
-  int cells_u() const { return u_.spans(); }
-  int cells_v() const { return v_.spans(); }
-  int control_u() const { return u_.control(); }
-  int control_v() const { return v_.control(); }
+  int cells_u() const { return u_->spans(); }
+  int cells_v() const { return v_->spans(); }
+  int control_u() const { return u_->control(); }
+  int control_v() const { return v_->control(); }
   int unknowns() const { return control_u() * control_v(); }
   int half_band() const { return 3 * std::min(control_u(), control_v()) + 3; }
   // The unknown's place in the equations: the shorter direction runs fastest, so that the band is narrow.
   bool v_is_fast() const { return control_v() <= control_u(); }
   int index(int i, int j) const { return v_is_fast() ? i * control_v() + j : j * control_u() + i; }
-  int first_index(int cell_u, int cell_v) const { return index(u_[cell_u].first, v_[cell_v].first); }
+  int first_index(int cell_u, int cell_v) const { return index((*u_)[cell_u].first, (*v_)[cell_v].first); }
 
   CellMatrix gram(int cell_u, int cell_v, const CellMoments&) const;
   CellVector load(int cell_u, int cell_v, std::span<const double, 16> moments) const;
@@ -100,17 +105,17 @@ class SplineNet {
   // The 16 coefficients that live on a cell.
   CellVector gather(std::span<const double> coefficients, int cell_u, int cell_v) const;
 
-  const SpanTable& spans_u() const { return u_; }
-  const SpanTable& spans_v() const { return v_; }
-  std::size_t bytes() const { return u_.bytes() + v_.bytes(); }
+  const SpanTable& spans_u() const { return *u_; }
+  const SpanTable& spans_v() const { return *v_; }
+  std::size_t bytes() const { return u_->bytes() + v_->bytes(); }
 
  private:
-  const SpanTable& slow() const { return v_is_fast() ? u_ : v_; }
-  const SpanTable& fast() const { return v_is_fast() ? v_ : u_; }
+  const SpanTable& slow() const { return v_is_fast() ? *u_ : *v_; }
+  const SpanTable& fast() const { return v_is_fast() ? *v_ : *u_; }
   // What the second derivatives along the slow and along the fast direction count.
   std::pair<double, double> fairing_factors(double length_u, double length_v) const;
 
-  SpanTable u_, v_;
+  std::shared_ptr<const SpanTable> u_, v_;
 };
 
 }  // namespace moldloft::geometry

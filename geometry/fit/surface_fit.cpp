@@ -6,6 +6,7 @@
 #include <bit>
 #include <cassert>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 // Blocks of matrices whose sizes were fixed in the constructor, vectors that grow within what was reserved there: the
@@ -20,12 +21,46 @@ constexpr double total_cost = 100;  // multiply-adds, about, of a cell's weight
 
 constexpr int cleared_a_step = 512;  // cells: 0.3 MB
 
-BSplineSurface surface_over(const SplineNet& net) {
-  BSplineSurface surface;
-  surface.knots_u = uniform_clamped_knots(net.cells_u());
-  surface.knots_v = uniform_clamped_knots(net.cells_v());
-  surface.x = surface.y = surface.z = Eigen::MatrixXd::Zero(net.control_u(), net.control_v());
-  return surface;
+// Room for a surface over every net that a plate may have; what is not taken is not touched.
+class Surfaces {
+ public:
+  Surfaces(int max_u, int max_v) : longest_(std::max(max_u, max_v)) {
+    const int shortest = std::min(max_u, max_v);
+    for (int u = fewest_spans; u <= longest_; u *= 2) {
+      for (int v = fewest_spans; v <= longest_; v *= 2) {
+        BSplineSurface& s = all_.emplace_back();
+        if (std::min(u, v) > shortest) continue;
+        s.knots_u = uniform_clamped_knots(u), s.knots_v = uniform_clamped_knots(v);
+        for (Eigen::MatrixXd* const m : {&s.x, &s.y, &s.z}) m->resize(u + cubic, v + cubic);
+      }
+    }
+    for (Eigen::MatrixXd* const m : {&all_.front().x, &all_.front().y, &all_.front().z}) m->setZero();
+  }
+
+  BSplineSurface& over(int spans_u, int spans_v) {
+    return all_[place(spans_u) * place(2 * longest_) + place(spans_v)];
+  }
+
+  std::size_t bytes() const {
+    std::size_t sum = 0;
+    for (const BSplineSurface& s : all_) sum += 3 * static_cast<std::size_t>(s.z.size()) * sizeof(double);
+    return sum;
+  }
+
+ private:
+  static std::size_t place(int spans) {
+    return static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(spans / fewest_spans)));
+  }
+
+  int longest_;
+  std::vector<BSplineSurface> all_;
+};
+
+// The power of two whose spans are nearest to `span_mm` by ratio, within what there is room for.
+int spans_over(double length_mm, double span_mm, int most) {
+  const double wanted = std::clamp(length_mm / span_mm * std::numbers::sqrt2, 1.0, static_cast<double>(most));
+  return std::min(
+      most, std::max(fewest_finest_spans, static_cast<int>(std::bit_floor(static_cast<unsigned>(wanted)))));
 }
 
 // Room for the shots' moments: a shot sees a tenth of a plate, every place is seen by a few shots, and small
@@ -42,13 +77,13 @@ struct SurfaceFit::Work {
 
   explicit Work(const SurfaceFitSettings& s)
       : settings(s),
-        finest(s.max_spans_u, s.max_spans_v),
-        search(SplineNet(s.max_spans_u, s.max_spans_v), {.tolerance = s.tolerance_mm}),
+        finest(MomentGrid::unwritten(s.max_spans_u, s.max_spans_v)),
+        search(SplineNet(s.max_spans_u, s.max_spans_v), {.tolerance = s.tolerance_mm, .shrinks = true}),
+        surfaces(s.max_spans_u, s.max_spans_v),
         shots(s.max_shots, s.max_spans_u, s.max_spans_v, shot_cells_planned(s),
-              s.shot_sigma_mm > 0 ? (s.max_spans_u + 3u) * (s.max_spans_v + 3u) : 0) {
-    for (const NetCandidate& c : search.candidates()) surfaces.push_back(surface_over(c.net));
-  }
+              s.shot_sigma_mm > 0 ? (s.max_spans_u + 3u) * (s.max_spans_v + 3u) : 0) {}
 
+  void choose_finest();
   void fold(int of_shot);
   bool total_some();
   std::expected<void, Flaw> start_search();
@@ -61,7 +96,9 @@ struct SurfaceFit::Work {
   SurfaceFitSettings settings;
   MomentGrid finest;  // takes the points
   NetSearch search;
-  std::vector<BSplineSurface> surfaces;  // over every net of the search
+  Surfaces surfaces;
+  BSplineSurface* surface =
+      &surfaces.over(fewest_spans, fewest_spans);  // that of the net that was chosen last
   ShotOffsets shots;
   const PlanMap* map = nullptr;
   PointTotals totals;
@@ -88,8 +125,7 @@ SurfaceFit::~SurfaceFit() = default;
 
 std::size_t SurfaceFit::bytes() const {
   std::size_t sum = sizeof(Work) + work_->finest.bytes() + work_->search.bytes() + work_->shots.bytes();
-  for (const BSplineSurface& surface : work_->surfaces) sum += 3 * surface.z.size() * sizeof(double);
-  return sum;
+  return sum + work_->surfaces.bytes();
 }
 
 void SurfaceFit::begin(const PlanMap& map) {
@@ -109,7 +145,8 @@ bool SurfaceFit::clear_some() {
 void SurfaceFit::begin_clearing(const PlanMap& map) {
   work_->map = &map;
   work_->cell = 0;
-  work_->shots.clear();
+  work_->choose_finest();
+  work_->shots.clear(work_->finest.cells_u(), work_->finest.cells_v());
   work_->totals = {};
   work_->report = {};
   work_->last_uv = {0.5, 0.5};
@@ -117,11 +154,26 @@ void SurfaceFit::begin_clearing(const PlanMap& map) {
   work_->phase = Work::Phase::adding;
 }
 
+void SurfaceFit::Work::choose_finest() {
+  const auto [least, most] = std::minmax(settings.max_spans_u, settings.max_spans_v);
+  int u = settings.max_spans_u, v = settings.max_spans_v;
+  if (settings.finest_span_mm > 0) {
+    const Eigen::Vector2d corners[] = {map->at(0, 0).value, map->at(1, 0).value, map->at(1, 1).value,
+                                       map->at(0, 1).value};
+    const auto side = [&](int i) { return (corners[(i + 1) % 4] - corners[i]).norm(); };
+    const double length_u = std::max(side(0), side(2)), length_v = std::max(side(1), side(3));
+    u = spans_over(length_u, settings.finest_span_mm, length_u < length_v ? least : most);
+    v = spans_over(length_v, settings.finest_span_mm, length_u < length_v ? most : least);
+  }
+  finest.reshape(u, v);
+  search.shrink_to(u, v);
+}
+
 // The block's heights and weights, and u and v, are there.
 void SurfaceFit::Work::fold(int of_shot) {
   if (block.count == 0) return;
   const MomentKernel& kernel = moment_kernel();
-  const int nu = settings.max_spans_u, nv = settings.max_spans_v;
+  const int nu = finest.cells_u(), nv = finest.cells_v();
   kernel.locate(block, u.data(), v.data(), {nu, nv, double(nu), double(nv), 0, 0});
   kernel.values(block);
   kernel.fold(block, finest.cells(), finest.counts());
@@ -193,11 +245,13 @@ std::expected<void, Flaw> SurfaceFit::Work::start_search() {
 
 void SurfaceFit::Work::finish() {
   const NetCandidate& chosen = search.chosen();
-  BSplineSurface& surface = surfaces[search.chosen_place()];
-  chosen.heights_into(surface.z, datum);
-  map->to_net(surface);
+  surface = &surfaces.over(chosen.net.cells_u(), chosen.net.cells_v());
+  chosen.heights_into(surface->z, datum);
+  map->to_net(*surface);
   const NetScore& score = search.score();
   report.spans_u = score.spans_u, report.spans_v = score.spans_v;
+  report.finest_spans_u = search.scores().front().spans_u,
+  report.finest_spans_v = search.scores().front().spans_v;
   report.rms_residual_mm = score.rms_residual, report.sigma_mm = score.sigma;
   report.smallest_pivot = score.smallest_pivot;
   report.empty_cells = score.empty_cells;
@@ -241,7 +295,7 @@ double SurfaceFit::progress() const {
 }
 
 double SurfaceFit::work() const { return work_->work; }
-const BSplineSurface& SurfaceFit::surface() const { return work_->surfaces[work_->search.chosen_place()]; }
+const BSplineSurface& SurfaceFit::surface() const { return *work_->surface; }
 const SurfaceFitReport& SurfaceFit::report() const { return work_->report; }
 
 }  // namespace moldloft::geometry

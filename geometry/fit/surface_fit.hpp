@@ -10,7 +10,8 @@
 // Frame        world, mm
 // Work         add() costs O(points) and is called with bounded chunks; step() does one bounded piece
 //              of the solution
-// Memory       fixed by the settings, never by the number of points; all of it allocated in the constructor
+// Memory       fixed by the settings, never by the number of points; all of it allocated in the constructor, and what a
+//              plate's net does not need is not touched
 // Failure      Error::capacity, singular, not_finite, too_few_points
 #pragma once
 
@@ -26,8 +27,15 @@
 
 namespace moldloft::geometry {
 
+// Spans a side of the finest net that a length of span may ask for.
+constexpr int fewest_finest_spans = 8, most_finest_spans = 256;
+
 struct SurfaceFitSettings {
-  int max_spans_u = 32, max_spans_v = 32;  // finest net, powers of two, at least 4
+  // The finest net that there is room for: powers of two, at least 4. Either may be that of a plate's longer side.
+  int max_spans_u = 32, max_spans_v = 32;
+  // Of the finest net over a plate: powers of two, their spans nearest to this (by ratio), as far as there is room, but
+  // 8 at least. 0: always the finest that there is room for.
+  double finest_span_mm = 0;
   int max_shots = 64;
   double shot_sigma_mm = 0.013;  // 0: shots are taken as exact
   // The coarsest net is taken that misses no more than this (rms) of what the best net explains. Errors of
@@ -41,10 +49,11 @@ struct SurfaceFitSettings {
 struct SurfaceFitReport {
   std::uint64_t points_used = 0, points_off = 0;  // folded in; outside the outline or rejected
   int spans_u = 0, spans_v = 0;
-  double rms_residual_mm = 0;  // weighted, of the chosen net, computed from the moments
-  double sigma_mm = 0;         // noise of one point: residual over the degrees of freedom
-  double smallest_pivot = 0;   // relative to the largest: small means a badly determined control point
-  int empty_cells = 0;         // of the chosen net
+  int finest_spans_u = 0, finest_spans_v = 0;  // of the finest net that was tried
+  double rms_residual_mm = 0;                  // weighted, of the chosen net, computed from the moments
+  double sigma_mm = 0;                         // noise of one point: residual over the degrees of freedom
+  double smallest_pivot = 0;  // relative to the largest: small means a badly determined control point
+  int empty_cells = 0;        // of the chosen net
   double shot_offset_rms_mm = 0, shot_offset_max_mm = 0;
   int shots_without_offset = 0;  // taken as exact, since the memory plan had no room for their moments
 };

@@ -8,12 +8,13 @@ namespace moldloft::geometry {
 
 namespace {
 
-constexpr std::size_t lead = 16;  // before the first column: whole vectors may begin above the diagonal
+// Before the first column and behind the last: whole vectors may begin above the diagonal and end below the band.
+constexpr std::size_t lead = 16, tail = 16;
 
 std::size_t leading_dimension(std::size_t half_band) { return (half_band + 17 + 7) / 8 * 8; }
 
 std::size_t storage(std::size_t size, std::size_t half_band) {
-  return lead + size * (leading_dimension(half_band) + 1) + 16;
+  return lead + size * (leading_dimension(half_band) + 1) + tail;
 }
 
 }  // namespace
@@ -32,6 +33,8 @@ void BandCholesky::reset(int size, int half_band) {
   assert(holds(static_cast<std::size_t>(size), static_cast<std::size_t>(half_band)));
   size_ = size, half_band_ = half_band;
   ld_ = static_cast<std::ptrdiff_t>(leading_dimension(half_band));
+  std::fill_n(band_.data(), lead, 0.0);
+  std::fill_n(start_ + size * (ld_ + 1), tail, 0.0);
   pivots_ = {.smallest = std::numeric_limits<double>::infinity()};
 }
 

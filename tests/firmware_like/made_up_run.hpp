@@ -128,6 +128,8 @@ inline RunResult MadeUpRun::result() {
   plate.outline = outline_of_made_up_plate();
   plate.tolerance_mm = 0.005;
   plate.fit.sigma_mm = noise_mm;
+  plate.fit.finest_spans_u = plate.fit.finest_spans_v = 32;
+  plate.fit.points_used = 1'000'000;
   plate.surface.knots_u = plate.surface.knots_v = geometry::uniform_clamped_knots(1);
   for (auto* net : {&plate.surface.x, &plate.surface.y, &plate.surface.z}) net->setZero(4, 4);
   geometry::PlanMap{plate.outline}.to_net(plate.surface);

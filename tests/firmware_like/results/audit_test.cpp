@@ -231,7 +231,7 @@ TEST_CASE("an outline that is not the plate's is held with the place") {
 TEST_CASE("what the memory plan left out and a net that is too coarse are warnings") {
   RunResult r = MadeUpRun{}.result();
   r.measured->fit.shots_without_offset = 3;
-  r.promised.finest_spans_u = 8;  // 37.5 mm of 300
+  r.measured->fit.finest_spans_u = 8;  // 37.5 mm of 300
   const auto findings = audit(r);
   CHECK(says(found(findings, FindingKind::memory_plan), "3 shots"));
   CHECK(says(found(findings, FindingKind::net), "37.5 mm"));

@@ -49,6 +49,7 @@ RunResult a_result() {
   plate.fit.sigma_mm = 0.0509;
   plate.fit.smallest_pivot = 1e-3;
   plate.fit.empty_cells = 4;
+  plate.fit.finest_spans_u = 64, plate.fit.finest_spans_v = 16;
   plate.fit.shot_offset_rms_mm = 0.0147;
   plate.fit.shot_offset_max_mm = 0.03;
   plate.tolerance_mm = 0.005;

@@ -121,3 +121,29 @@ TEST_CASE("cells without points are named where nothing fairs the surface over t
   REQUIRE(search.start(moments.grid(), model_over(moments, 0)).has_value());
   CHECK(search.finish().has_value());
 }
+
+TEST_CASE("a search that has shrunk is one that was made so") {
+  NetSearch shrinking(SplineNet(32, 16), {.shrinks = true});
+  for (const auto& [u, v] : {std::pair(8, 16), std::pair(4, 4), std::pair(16, 32), std::pair(16, 8)}) {
+    MomentAccumulator moments(u, v);
+    std::vector<double> columns[3];
+    for (int k = 0; k < 4000; ++k) {
+      columns[0].push_back(std::fmod(0.5 + k * 0.7548776662466927, 1));
+      columns[1].push_back(std::fmod(0.5 + k * 0.5698402909980532, 1));
+      columns[2].push_back(std::sin(7 * columns[0].back()) * std::cos(5 * columns[1].back()));
+    }
+    REQUIRE(moments.add({.u = columns[0], .v = columns[1], .z = columns[2]}).has_value());
+    NetSearch made_so(SplineNet(u, v), {});
+    shrinking.shrink_to(u, v);
+    for (NetSearch* search : {&shrinking, &made_so}) {
+      REQUIRE(search->start(moments.grid(), model_over(moments)).has_value());
+      REQUIRE(search->finish().has_value());
+    }
+    REQUIRE(shrinking.candidates().size() == made_so.candidates().size());
+    CHECK(shrinking.scores().size() == made_so.scores().size());
+    for (std::size_t k = 0; k < made_so.candidates().size(); ++k) {
+      CHECK(shrinking.candidates()[k].coefficients == made_so.candidates()[k].coefficients);
+    }
+    CHECK(shrinking.chosen_place() == made_so.chosen_place());
+  }
+}

@@ -8,10 +8,12 @@
 
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <functional>
 #include <numbers>
 #include <random>
 #include <string>
+#include <unistd.h>
 
 using namespace moldloft;
 using Eigen::MatrixXd, Eigen::Vector2d, Eigen::Vector3d, Eigen::VectorXd;
@@ -25,8 +27,18 @@ struct Shot {
   double weight = 1;
 };
 
-std::expected<void, Error> fit(SurfaceFit& surface_fit, const PlanMap& map, const std::vector<Shot>& shots) {
-  surface_fit.begin(map);
+struct Counts {
+  int pieces = 0;
+  double work = 0;
+};
+
+std::expected<void, Error> fit(SurfaceFit& surface_fit, const PlanMap& map, const std::vector<Shot>& shots,
+                               Counts* counts = nullptr) {
+  surface_fit.begin_clearing(map);
+  for (bool cleared = false; !cleared;) {
+    cleared = surface_fit.clear_some();
+    if (counts != nullptr) ++counts->pieces;
+  }
   for (std::size_t s = 0; s < shots.size(); ++s) {
     const auto added = surface_fit.add(shots[s].points, shots[s].weight, static_cast<int>(s));
     if (!added) return added;
@@ -34,6 +46,7 @@ std::expected<void, Error> fit(SurfaceFit& surface_fit, const PlanMap& map, cons
   surface_fit.start_solving();
   while (true) {
     const auto ready = surface_fit.step();
+    if (counts != nullptr) ++counts->pieces, counts->work += surface_fit.work();
     if (!ready) return std::unexpected(ready.error());
     if (*ready) return {};
   }
@@ -407,4 +420,75 @@ TEST_CASE("adding and solving take no memory, and no step more than the stated w
   CHECK(surface_fit.bytes() < 8'000'000);
   MESSAGE("128 x 64 spans, 256 shots: "
           << SurfaceFit({.max_spans_u = 128, .max_spans_v = 64, .max_shots = 256}).bytes() << " bytes");
+}
+
+namespace {
+
+PlanMap map_over(double along_u_mm, double along_v_mm) {
+  const std::array<Vector2d, 4> corners{
+      Vector2d(0, 0), {along_u_mm, 0}, {along_u_mm, along_v_mm}, {0, along_v_mm}};
+  return PlanMap(test::straight_outline(corners));
+}
+
+const Height bent = [](double x, double y) { return 100 + 8 * std::sin(x / 70) * std::cos(y / 90); };
+
+// What of this process lies in memory.
+double resident_bytes() {
+  double pages = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> pages >> resident;
+  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE));
+}
+
+}  // namespace
+
+TEST_CASE("a plate costs the same steps and has the same surface under any larger plan") {
+  const PlanMap map(test::straight_outline(square));
+  const auto shots = random_shots(map, bent, 6, 4000, 0.05, 0.013, 3);
+  SurfaceFit own({.max_spans_u = 32, .max_spans_v = 32, .finest_span_mm = 10, .max_shots = 8});
+  SurfaceFit large({.max_spans_u = 256, .max_spans_v = 128, .finest_span_mm = 10, .max_shots = 600});
+  const PlanMap other = map_over(2000, 900);  // a plate before it leaves nothing behind
+  REQUIRE(fit(large, other, random_shots(other, bent, 2, 60'000, 0.05, 0, 4)).has_value());
+  Counts of_own, of_large;
+  REQUIRE(fit(own, map, shots, &of_own).has_value());
+  REQUIRE(fit(large, map, shots, &of_large).has_value());
+  CHECK(of_large.pieces == of_own.pieces);
+  CHECK(of_large.work == of_own.work);
+  CHECK(large.surface().z == own.surface().z);
+  CHECK(large.surface().x == own.surface().x);
+  CHECK(large.report().finest_spans_u == 32);
+  CHECK(large.report().finest_spans_v == 32);
+}
+
+TEST_CASE("the finest net has the spans nearest to those asked for, along whichever side is the longer") {
+  SurfaceFit surface_fit(
+      {.max_spans_u = 64, .max_spans_v = 16, .finest_span_mm = 40, .max_shots = 1, .shot_sigma_mm = 0});
+  struct Case {
+    double u_mm, v_mm;
+    int spans_u, spans_v;
+  };
+  for (const Case& c :
+       {Case{2600, 300, 64, 8}, Case{300, 2600, 8, 64}, Case{1260, 1250, 32, 16}, Case{1250, 1260, 16, 32},
+        Case{890, 440, 16, 8}, Case{920, 460, 32, 16}, Case{9000, 9000, 64, 16}, Case{60, 40, 8, 8}}) {
+    CAPTURE(c.u_mm);
+    CAPTURE(c.v_mm);
+    const PlanMap map = map_over(c.u_mm, c.v_mm);
+    REQUIRE(fit(surface_fit, map, random_shots(map, bent, 1, 8000, 0.05, 0, 2)).has_value());
+    CHECK(surface_fit.report().finest_spans_u == c.spans_u);
+    CHECK(surface_fit.report().finest_spans_v == c.spans_v);
+    CHECK(surface_fit.surface().control_u() == surface_fit.report().spans_u + 3);
+    // Too few points for the finest net: the one that was tried is named.
+    REQUIRE(fit(surface_fit, map, random_shots(map, bent, 1, 300, 0.05, 0, 2)).has_value());
+    CHECK(surface_fit.report().finest_spans_u * surface_fit.report().finest_spans_v < 75);
+  }
+}
+
+TEST_CASE("room that a plate's net does not need is not touched") {
+  const PlanMap map(test::straight_outline(square));
+  const auto shots = random_shots(map, bent, 6, 4000, 0.05, 0.013, 3);
+  const double before = resident_bytes();
+  SurfaceFit large({.max_spans_u = 256, .max_spans_v = 256, .finest_span_mm = 10, .max_shots = 300});
+  REQUIRE(large.bytes() > 600'000'000);
+  CHECK(resident_bytes() - before < 100'000'000);
+  REQUIRE(fit(large, map, shots).has_value());
+  CHECK(resident_bytes() - before < 100'000'000);
 }
