@@ -139,8 +139,8 @@ void Audit::check_edge_points() {
     ragged_length += d.length_mm;
     teeth = std::max(teeth, d.distance_mm());
   }
-  const double other_shape_mm =
-      ragged_length > outline_.length_mm() / 2 ? std::max(smooth_rim_mm, 1.5 * teeth) : smooth_rim_mm;
+  const bool is_torn = ragged_length > outline_.length_mm() / 2;
+  const double other_shape_mm = is_torn ? std::max(smooth_rim_mm, 1.5 * teeth) : smooth_rim_mm;
   std::vector<Finding> named;
   std::optional<std::size_t> shape;  // of those, the farthest that is no matter of the rim
   for (const auto& d : *deviations) {
@@ -160,6 +160,7 @@ void Audit::check_edge_points() {
         "the plate has not four smooth sides that meet in four corners: {}; its outline cannot be told",
         named[*shape].text);
   add_named(std::move(named), "places");
+  if (is_torn) return;
   for (Finding& corner : blunt_corners()) add(std::move(corner));
 }
 

@@ -11,16 +11,17 @@ namespace moldloft::firmware_like {
 namespace {
 
 constexpr double length_scale_mm = 100;  // brings turns and tilts to the size of shifts
-// What no observation determines is taken as none: against the weight of one observation in a hundred.
-constexpr double ridge = 1e-2;
+// What no observation determines is taken as none: motions are expected to be of a millimetre. On a twisted plate a
+// shift in plan and a tilt look alike in height, and only this tells them apart where no edge was seen.
+constexpr double ridge = 1;
 // A mount that explains so much of what the best model does is believed. A plate that seems to move where the sweep
 // begins, and the head turns, looks much the same: there less is enough.
 constexpr double mount_share = 0.97, mount_share_at_sweep = 0.6;
 
-// In plan: shift x, shift y, turn; in height: lift, tilt about x and y. They do not mix.
-using Row = Eigen::Vector3d;
+// Of a body: shift along x, y and z, then turn about x, y and z in units of 1 / length_scale_mm.
+using Row = Eigen::Matrix<double, 6, 1>;
 // The same twice: where the plate lies at all, and what a model adds.
-using TwiceRow = Eigen::Matrix<double, 6, 1>;
+using TwiceRow = Eigen::Matrix<double, 12, 1>;
 
 template <typename R>
 struct Sums {
@@ -28,19 +29,21 @@ struct Sums {
   Eigen::Matrix<double, size, size> normal = Eigen::Matrix<double, size, size>::Zero();
   R right = R::Zero();
   // In units of what is expected of one observation, less one for each: what is there beyond chance.
-  double excess = 0;
+  double excess_in_plan = 0, excess_in_height = 0;
 
-  void add(const R& row, double value, double weight) {
+  void add(const R& row, double value, double weight, double& excess) {
     normal += weight * row * row.transpose();
     right += weight * value * row;
     excess += weight * value * value - 1;
   }
   Sums& operator+=(const Sums& other) {
-    normal += other.normal, right += other.right, excess += other.excess;
+    normal += other.normal, right += other.right;
+    excess_in_plan += other.excess_in_plan, excess_in_height += other.excess_in_height;
     return *this;
   }
   Sums operator-(const Sums& other) const {
-    return {normal - other.normal, right - other.right, excess - other.excess};
+    return {normal - other.normal, right - other.right, excess_in_plan - other.excess_in_plan,
+            excess_in_height - other.excess_in_height};
   }
   R solution() const {
     const Eigen::Matrix<double, size, size> a =
@@ -48,22 +51,9 @@ struct Sums {
     return a.ldlt().solve(right);
   }
   double explained() const { return right.dot(solution()); }
-};
-
-template <typename R>
-struct Both {
-  Sums<R> plan, height;
-  Both& operator+=(const Both& other) {
-    plan += other.plan, height += other.height;
-    return *this;
-  }
-  Both operator-(const Both& other) const { return {plan - other.plan, height - other.height}; }
-  double explained() const { return plan.explained() + height.explained(); }
   // Of either alone: a scanner that is less noisy than expected shall not hide what the edges say.
-  double excess() const { return std::max(plan.excess, 0.0) + std::max(height.excess, 0.0); }
+  double excess() const { return std::max(excess_in_plan, 0.0) + std::max(excess_in_height, 0.0); }
 };
-
-Eigen::Vector2d turned(const Eigen::Vector2d& v) { return {-v.y(), v.x()}; }
 
 // A distance far beyond what is expected counts linearly, not squared: a tooth of the rim shall not outweigh a side.
 double robust_weight(double value, double sigma) {
@@ -72,140 +62,136 @@ double robust_weight(double value, double sigma) {
   return (size > knee ? knee / size : 1) / (sigma * sigma);
 }
 
-struct Height {
-  std::size_t shot;
-  Eigen::Vector3d point;
-  double above_mm;
+// How far something was seen from where it was expected, along a direction: an edge from the outline along its normal,
+// a point from the surface along z. On a slope a shift in plan shows in height too.
+struct Observation {
+  std::size_t shot = 0;
+  Eigen::Vector3d point{0, 0, 0}, along{0, 0, 0};
+  double off_mm = 0;
+  bool in_height = false;
 };
 
-std::vector<Height> heights_of(const tasks::RunEvidence& evidence, const geometry::PlanMap& map,
-                               const geometry::BSplineSurface& surface) {
-  std::vector<Height> heights;
+// What a small motion of a body about `centre` does to `point`, seen along a direction.
+Row body_row(const Eigen::Vector3d& along, const Eigen::Vector3d& point, const Eigen::Vector3d& centre) {
+  Row row;
+  row << along, (point - centre).cross(along) / length_scale_mm;
+  return row;
+}
+
+// Beyond the plate by more than the map reaches: of the plate's middle.
+double surface_height(const geometry::PlanMap& map, const geometry::BSplineSurface& surface,
+                      const Eigen::Vector2d& place) {
+  const Eigen::Vector2d uv = map.invert(place, {0.5, 0.5}).value_or(Eigen::Vector2d{0.5, 0.5});
+  return surface.at(uv.x(), uv.y()).value.z();
+}
+
+std::vector<Observation> observations_of(const tasks::RunEvidence& evidence,
+                                         const std::vector<SeenEdge>& edges, const geometry::PlanMap& map,
+                                         const geometry::BSplineSurface& surface) {
+  std::vector<Observation> all;
   Eigen::Vector2d guess{0.5, 0.5};
   for (std::size_t i = 0; i < evidence.shots.size(); ++i) {
     for (const auto& p : evidence.samples_of(i)) {
       const auto uv = map.invert(p.head<2>(), guess);
       if (!uv) continue;
       guess = *uv;
-      heights.push_back({i, p, p.z() - surface.at(uv->x(), uv->y()).value.z()});
+      const auto on = surface.at(uv->x(), uv->y());
+      const Eigen::Vector3d n = on.du.cross(on.dv);
+      all.push_back({i, p, n / n.z(), p.z() - on.value.z(), true});
     }
   }
-  return heights;
+  for (const auto& e : edges) {
+    const Eigen::Vector3d point{e.point.x(), e.point.y(), surface_height(map, surface, e.point)};
+    all.push_back(
+        {e.shot, point, {e.place.outwards.x(), e.place.outwards.y(), 0}, e.place.distance_mm, false});
+  }
+  return all;
 }
 
 struct Observations {
   const tasks::RunEvidence& evidence;
-  const std::vector<SeenEdge>& edges;
-  std::vector<Height> heights;
+  std::vector<Observation> all;
   Expected expected;
-  Eigen::Vector2d middle;
+  Eigen::Vector3d middle;
 
-  // Sums of every shot, with rows as `plan_row` and `height_row` make them.
-  template <typename R, typename PlanRow, typename HeightRow>
-  std::vector<Both<R>> sums(PlanRow plan_row, HeightRow height_row) const {
-    std::vector<Both<R>> of_shot(evidence.shots.size());
-    for (const auto& e : edges)
-      of_shot[e.shot].plan.add(plan_row(e), e.place.distance_mm,
-                               robust_weight(e.place.distance_mm, expected.edge_mm));
-    for (const auto& h : heights)
-      of_shot[h.shot].height.add(height_row(h), h.above_mm, robust_weight(h.above_mm, expected.height_mm));
+  Row plate_row(const Observation& o) const { return body_row(o.along, o.point, middle); }
+  // In the scanner's own frame.
+  Row mount_row(const Observation& o) const {
+    const auto scanner_from_world = evidence.shots[o.shot].world_from_scanner.inverse();
+    return body_row(scanner_from_world.linear() * o.along, scanner_from_world * o.point, {0, 0, 0});
+  }
+  // Sums of every shot, with rows as `row_of` makes them.
+  template <typename R, typename RowOf>
+  std::vector<Sums<R>> sums(RowOf row_of) const {
+    std::vector<Sums<R>> of_shot(evidence.shots.size());
+    for (const Observation& o : all) {
+      Sums<R>& sum = of_shot[o.shot];
+      sum.add(row_of(o), o.off_mm,
+              robust_weight(o.off_mm, o.in_height ? expected.height_mm : expected.edge_mm),
+              o.in_height ? sum.excess_in_height : sum.excess_in_plan);
+    }
     return of_shot;
   }
 };
 
 template <typename R>
-Both<R> total(const std::vector<Both<R>>& of_shot) {
-  Both<R> sum;
+Sums<R> total(const std::vector<Sums<R>>& of_shot) {
+  Sums<R> sum;
   for (const auto& s : of_shot) sum += s;
   return sum;
 }
 
-void describe(Motion& m, const Row& plan, const Row& height) {
-  m.shift_mm = plan.head<2>();
-  m.turn_rad = plan.z() / length_scale_mm;
-  m.lift_mm = height.x();
-  m.tilt_rad = height.tail<2>() / length_scale_mm;
+void describe(Motion& m, const Row& row) {
+  m.shift_mm = row.head<2>();
+  m.lift_mm = row.z();
+  m.tilt_rad = row.segment<2>(3) / length_scale_mm;
+  m.turn_rad = row[5] / length_scale_mm;
 }
 
-auto plate_rows(const Observations& o) {
-  return std::pair{[&o](const SeenEdge& e) {
-                     const auto& n = e.place.outwards;
-                     return Row{n.x(), n.y(), n.dot(turned(e.point - o.middle)) / length_scale_mm};
-                   },
-                   [&o](const Height& h) {
-                     const Eigen::Vector2d d = (h.point.head<2>() - o.middle) / length_scale_mm;
-                     return Row{1, d.x(), d.y()};
-                   }};
-}
-
-// What the plate alone would explain if it lay elsewhere from the start: of any model that is no gain.
-double explained_by_rest(const Observations& o) {
-  const auto [plan_row, height_row] = plate_rows(o);
-  return total(o.sums<Row>(plan_row, height_row)).explained();
+Sums<Row> sum_of_plate(const Observations& o) {
+  return total(o.sums<Row>([&](const Observation& seen) { return o.plate_row(seen); }));
 }
 
 Motion moved(const Observations& o, double disagreement) {
-  const auto [plan_row, height_row] = plate_rows(o);
-  const auto of_shot = o.sums<Row>(plan_row, height_row);
-  const Both all = total(of_shot);
+  const auto of_shot = o.sums<Row>([&](const Observation& seen) { return o.plate_row(seen); });
+  const Sums all = total(of_shot);
   Motion best{.cause = Cause::moved};
+  // What the plate alone would explain if it lay elsewhere from the start is no gain of any model.
   const double without = all.explained();
-  Both<Row> before;
+  Sums<Row> before;
   for (std::size_t k = 1; k < of_shot.size(); ++k) {
     before += of_shot[k - 1];
-    const Both after = all - before;
+    const Sums after = all - before;
     const double explained = (before.explained() + after.explained() - without) / disagreement;
     if (explained <= best.explained) continue;
     best.explained = explained, best.shot = k;
-    describe(best, after.plan.solution() - before.plan.solution(),
-             after.height.solution() - before.height.solution());
+    describe(best, after.solution() - before.solution());
   }
   return best;
 }
 
-Motion drift(const Observations& o, double disagreement) {
-  const auto [plan_row, height_row] = plate_rows(o);
-  const double last = std::max<double>(1, static_cast<double>(o.evidence.shots.size() - 1));
-  const auto growing = [&](const Row& row, std::size_t shot) {
+// A model that adds six unknowns to where the plate lies.
+template <typename RowOf>
+Motion with(Cause cause, const Observations& o, double disagreement, RowOf model_row) {
+  const Sums all = total(o.sums<TwiceRow>([&](const Observation& seen) {
     TwiceRow both;
-    both << row, row * (static_cast<double>(shot) / last);
+    both << o.plate_row(seen), model_row(seen);
     return both;
-  };
-  const Both all = total(o.sums<TwiceRow>([&](const SeenEdge& e) { return growing(plan_row(e), e.shot); },
-                                          [&](const Height& h) { return growing(height_row(h), h.shot); }));
-  Motion m{.cause = Cause::drift, .explained = (all.explained() - explained_by_rest(o)) / disagreement};
-  describe(m, all.plan.solution().tail<3>(), all.height.solution().tail<3>());
+  }));
+  Motion m{.cause = cause, .explained = (all.explained() - sum_of_plate(o).explained()) / disagreement};
+  describe(m, all.solution().template tail<6>());
   return m;
 }
 
+Motion drift(const Observations& o, double disagreement) {
+  const double last = std::max<double>(1, static_cast<double>(o.evidence.shots.size() - 1));
+  return with(Cause::drift, o, disagreement, [&](const Observation& seen) -> Row {
+    return o.plate_row(seen) * (static_cast<double>(seen.shot) / last);
+  });
+}
+
 Motion mount(const Observations& o, double disagreement) {
-  const auto [plan_row, height_row] = plate_rows(o);
-  const auto scanner_plan = [&](std::size_t shot) -> Eigen::Matrix2d {
-    return o.evidence.shots[shot].world_from_scanner.linear().topLeftCorner<2, 2>();
-  };
-  const auto from_centre = [&](std::size_t shot, const Eigen::Vector2d& p) -> Eigen::Vector2d {
-    return p - o.evidence.shots[shot].world_from_scanner.translation().head<2>();
-  };
-  const auto beside_rest = [](const Row& rest, const Row& of_mount) {
-    TwiceRow both;
-    both << rest, of_mount;
-    return both;
-  };
-  const Both all = total(o.sums<TwiceRow>(
-      [&](const SeenEdge& e) {
-        const auto& n = e.place.outwards;
-        const Eigen::Vector2d shift = scanner_plan(e.shot).transpose() * n;
-        return beside_rest(plan_row(e), {shift.x(), shift.y(),
-                                         n.dot(turned(from_centre(e.shot, e.point))) / length_scale_mm});
-      },
-      [&](const Height& h) {
-        const Eigen::Vector2d d =
-            scanner_plan(h.shot).transpose() * from_centre(h.shot, h.point.head<2>()) / length_scale_mm;
-        return beside_rest(height_row(h), {0, d.x(), d.y()});
-      }));
-  Motion m{.cause = Cause::mount, .explained = (all.explained() - explained_by_rest(o)) / disagreement};
-  describe(m, all.plan.solution().tail<3>(), all.height.solution().tail<3>());
-  return m;
+  return with(Cause::mount, o, disagreement, [&](const Observation& seen) { return o.mount_row(seen); });
 }
 
 }  // namespace
@@ -214,13 +200,12 @@ Motion best_motion(const tasks::RunEvidence& evidence, const std::vector<SeenEdg
                    const geometry::PlanMap& map, const geometry::BSplineSurface& surface,
                    const Expected& expected) {
   const auto& c = map.outline().corners;
+  const Eigen::Vector2d middle = (c[0] + c[1] + c[2] + c[3]) / 4;
   const Observations o{.evidence = evidence,
-                       .edges = edges,
-                       .heights = heights_of(evidence, map, surface),
+                       .all = observations_of(evidence, edges, map, surface),
                        .expected = expected,
-                       .middle = (c[0] + c[1] + c[2] + c[3]) / 4};
-  const auto [plan_row, height_row] = plate_rows(o);
-  const double disagreement = std::max(total(o.sums<Row>(plan_row, height_row)).excess(), 1.0);
+                       .middle = {middle.x(), middle.y(), surface_height(map, surface, middle)}};
+  const double disagreement = std::max(sum_of_plate(o).excess(), 1.0);
   const Motion by_mount = mount(o, disagreement);
   Motion best = moved(o, disagreement);
   if (const Motion by_drift = drift(o, disagreement); by_drift.explained > best.explained) best = by_drift;

@@ -17,6 +17,8 @@ constexpr std::size_t most_bins = 8192, most_runs = 128;
 constexpr double least_bin_mm = 2;  // edge points of one shot lie 1.4 mm apart
 constexpr int foot_iterations = 3;
 constexpr std::size_t fewest_teeth = 3;
+// Round more than one corner: a plate of another smooth shape crosses the four sides of its outline eight times.
+constexpr int turns_of_teeth = 12;
 constexpr double small_corner_mm = 12;
 constexpr double least_spread = 0.15;   // of the chord; points all along it have 0.29
 constexpr std::size_t margin_bins = 2;  // a notch's walls stand over the ends of its mouth
@@ -99,6 +101,8 @@ struct OutlineCheck::Run {
   double inwards = 0, outwards = 0;
   Vector2d reference = Vector2d::Zero();
   int corner = -1;
+  int turns = 0;  // how often points on one side of the outline follow points on the other
+  bool is_inside = false;
   Moments moments;
 };
 
@@ -381,6 +385,9 @@ void OutlineCheck::gather_chunk() {
       if (best == nullptr || best->beside) best = &run;
     }
     if (best == nullptr) continue;
+    const bool is_inside = foot.inwards > 0;
+    if (best->points > 0 && is_inside != best->is_inside) ++best->turns;
+    best->is_inside = is_inside;
     ++best->points;
     best->inwards = std::max(best->inwards, static_cast<double>(foot.inwards));
     best->outwards = std::max(best->outwards, static_cast<double>(-foot.inwards));
@@ -432,7 +439,20 @@ OutlineDeviation OutlineCheck::name_run(const Run& run) const {
     named.kind = Kind::unseen;
   else if (run.corner >= 0)
     describe_corner(run, named);
+  else if (is_ragged(run))
+    named.kind = Kind::ragged;
   return named;
+}
+
+// In and out, again and again.
+bool OutlineCheck::is_ragged(const Run& run) const {
+  const double begin = unwrapped(run.begin), end = unwrapped(run.end);
+  const bool goes_round = std::ranges::any_of(station_, [&](double corner) {
+    const auto within = [&](double at) { return at > begin && at < end; };
+    return within(corner) || within(corner + station_[4]);
+  });
+  const int fewest = goes_round ? turns_of_teeth : static_cast<int>(fewest_teeth);
+  return run.turns >= fewest && end - begin < settings_.tooth_mm * run.turns;
 }
 
 // What stands where the corner should be: a line, an arc, or neither.

@@ -109,6 +109,7 @@ class OutlineCheck {
   void gather_chunk();
   void name_runs();
   OutlineDeviation name_run(const Run&) const;
+  bool is_ragged(const Run&) const;
   void describe_corner(const Run&, OutlineDeviation&) const;
   void join_teeth();
   void add_unseen_corners();

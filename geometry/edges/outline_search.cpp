@@ -14,6 +14,7 @@ using Eigen::Vector2d;
 
 // Of the settings' ring: sides down to 40 mm are longer than the smallest.
 constexpr std::array scales{1.0, 0.6, 0.4, 0.25};
+constexpr double torn_hold = 2;   // so many times as far may a corner lie where the whole rim is torn
 constexpr int most_attempts = 5;  // of one scale: a bent side straightens in two or three
 constexpr std::size_t points_a_step = 256;
 constexpr double widest_share = 0.15;  // of its length: how far a side may leave the chord of its corners
@@ -75,7 +76,7 @@ void OutlineSearch::begin(std::span<const Vector2d> edges, std::span<const Vecto
   edges_ = edges, candidates_ = candidates;
   named_count_ = corner_count_ = 0;
   share_along_ = 0;
-  has_outline_ = false;
+  has_outline_ = is_torn_ = false;
   scale_ = 0;
   begin_scale();
 }
@@ -186,6 +187,7 @@ std::expected<bool, Error> OutlineSearch::check_done() {
   }
   // Leaving teeth out would leave most of the edge out.
   if (attempt_ == 0 && is_torn_all_round()) {
+    is_torn_ = true;
     stage_ = Stage::done;
     return true;
   }
@@ -319,7 +321,7 @@ std::expected<bool, Error> OutlineSearch::next_scale() {
   return true;
 }
 
-// Teeth along more than half of the boundary: how far a corner is off says nothing of the plate's shape.
+// Teeth along more than half of the boundary: a corner that is off by as much says nothing of the plate's shape.
 bool OutlineSearch::is_torn_all_round() const {
   double torn = 0, around = 0;
   for (const OutlineDeviation& d : deviations())
@@ -329,9 +331,9 @@ bool OutlineSearch::is_torn_all_round() const {
 }
 
 bool OutlineSearch::is_trusted() const {
-  if (has_outline_ && is_torn_all_round()) return true;
+  const double hold_mm = is_torn_ ? torn_hold * settings_.hold_mm : settings_.hold_mm;
   return has_outline_ && std::ranges::all_of(deviations(), [&](const OutlineDeviation& d) {
-           return weight_of(d) <= settings_.hold_mm;
+           return weight_of(d) <= hold_mm;
          });
 }
 

@@ -103,6 +103,7 @@ class OutlineSearch {
   std::array<OutlineDeviation, OutlineCheck::most_deviations> named_;
   std::size_t named_count_ = 0;
   bool has_outline_ = false;
+  bool is_torn_ = false;
   std::array<Eigen::Vector2d, most_corners> corners_, polygon_;
   std::size_t corner_count_ = 0, polygon_count_ = 0, next_ = 0, along_ = 0;
   double share_along_ = 0;

@@ -62,9 +62,7 @@ Measurement::Measurement(const CellSettings& settings, Supervisor& supervisor, S
       tracker_{settings.tracker},
       view_{settings.max_stripes, settings.max_points, settings.view},
       evidence_{
-          {.max_shots = static_cast<std::size_t>(settings.tracker.max_shots) + 1 + settings.max_surface_shots,
-           .max_stripes = settings.max_stripes,
-           .max_points = settings.max_points}},
+          {.max_shots = static_cast<std::size_t>(settings.tracker.max_shots) + 1 + settings.max_surface_shots}},
       surface_places_(settings.max_surface_shots),
       time_left_{settings.tracker, settings.scan} {
   boundary_places_.reserve(static_cast<std::size_t>(settings.tracker.max_shots) + 1);
@@ -281,7 +279,7 @@ std::optional<double> Measurement::learn_heights(const geometry::RigidMotion& wo
   double sum = 0;
   int count = 0;
   std::array<Eigen::Vector3d, 64> points;
-  view_.rewind(height_stride);
+  view_.rewind({.stripe_stride = height_stride, .point_stride = height_stride});
   for (std::size_t n = view_.next(points); n > 0; n = view_.next(points)) {
     for (std::size_t i = 0; i < n; ++i) {
       const Eigen::Vector3d p = world_from_scanner * points[i];

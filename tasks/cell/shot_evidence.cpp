@@ -18,6 +18,11 @@ std::span<const T> part(const std::vector<T>& all, std::size_t begin, std::size_
   return std::span{all}.subspan(begin, end - begin);
 }
 
+// So that of `all` at most `wanted` remain.
+std::uint32_t stride_for(std::size_t all, std::size_t wanted) {
+  return static_cast<std::uint32_t>((all + wanted - 1) / wanted);
+}
+
 }  // namespace
 
 std::span<const SeenRun> RunEvidence::runs_of(std::size_t shot) const {
@@ -28,11 +33,7 @@ std::span<const Eigen::Vector3d> RunEvidence::samples_of(std::size_t shot) const
   return part(samples, shot == 0 ? 0 : shots[shot - 1].samples_end, shots[shot].samples_end);
 }
 
-EvidenceBook::EvidenceBook(const Settings& settings)
-    : stripe_stride_{static_cast<std::uint16_t>((settings.max_stripes + stripes_a_shot - 1) /
-                                                stripes_a_shot)},
-      sample_stride_{static_cast<std::uint32_t>(
-          std::max(1.0, std::ceil(std::sqrt(static_cast<double>(settings.max_points) / samples_a_shot))))} {
+EvidenceBook::EvidenceBook(const Settings& settings) {
   kept_.shots.reserve(settings.max_shots);
   kept_.runs.reserve(settings.max_shots * runs_a_shot);
   kept_.samples.reserve(settings.max_shots * samples_a_shot);
@@ -54,10 +55,15 @@ RunEdge EvidenceBook::edge_at(geometry::RunEnd end) {
   return geometry::is_edge(end) ? RunEdge::edge : RunEdge::none;
 }
 
+// How much is left out follows from how much of the plate the shot shows, a corner of it or all that the field holds.
 void EvidenceBook::add_runs(const geometry::RigidMotion& world_from_scanner, const ShotView& view) {
+  const auto runs = view.runs();
+  if (runs.empty()) return;
+  const std::uint32_t first = runs.front().stripe,
+                      stride = stride_for(runs.back().stripe - first + 1, stripes_a_shot);
   std::size_t left = runs_a_shot;
-  for (const geometry::PlateRun& run : view.runs()) {
-    if (run.stripe % stripe_stride_ != 0) continue;
+  for (const geometry::PlateRun& run : runs) {
+    if ((run.stripe - first) % stride != 0) continue;
     if (left-- == 0) return;
     const Eigen::Vector3d first = view.first_of(run), last = view.last_of(run);
     hal::add_within_reserve(kept_.runs, SeenRun{.first = world_from_scanner * first,
@@ -67,15 +73,25 @@ void EvidenceBook::add_runs(const geometry::RigidMotion& world_from_scanner, con
   }
 }
 
+void EvidenceBook::add_samples(const geometry::RigidMotion& world_from_scanner, ShotView& view) {
+  const auto runs = view.runs();
+  if (runs.empty()) return;
+  std::uint32_t longest = 0;
+  for (const geometry::PlateRun& run : runs) longest = std::max(longest, run.last - run.first + 1);
+  std::array<Eigen::Vector3d, samples_a_shot> points;
+  view.rewind({.stripe_stride = stride_for(runs.back().stripe - runs.front().stripe + 1, samples_across),
+               .point_stride = stride_for(longest, samples_across),
+               .first_stripe = runs.front().stripe});
+  const std::size_t count = view.next(points);
+  for (std::size_t i = 0; i < count; ++i)
+    hal::add_within_reserve(kept_.samples, world_from_scanner * points[i]);
+}
+
 void EvidenceBook::add(const ShotSeen& shot, ShotView& view, std::size_t edge_points) {
   if (kept_.shots.size() == kept_.shots.capacity()) return;
   if (shot.plate_found) {
     add_runs(shot.world_from_scanner, view);
-    std::array<Eigen::Vector3d, samples_a_shot> points;
-    view.rewind(sample_stride_);
-    const std::size_t count = view.next(points);
-    for (std::size_t i = 0; i < count; ++i)
-      hal::add_within_reserve(kept_.samples, shot.world_from_scanner * points[i]);
+    add_samples(shot.world_from_scanner, view);
   }
   ShotSeen kept = shot;
   kept.runs_end = static_cast<std::uint32_t>(kept_.runs.size());

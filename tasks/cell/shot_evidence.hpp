@@ -60,8 +60,6 @@ class EvidenceBook {
  public:
   struct Settings {
     std::size_t max_shots = 0;
-    std::size_t max_stripes = 100,
-                max_points = 50'000;  // of a frame: how much it is thinned follows from them
   };
   explicit EvidenceBook(const Settings&);
 
@@ -82,12 +80,12 @@ class EvidenceBook {
   std::size_t bytes() const;
 
  private:
-  static constexpr std::size_t stripes_a_shot = 40, runs_a_shot = 64, samples_a_shot = 128;
+  static constexpr std::size_t stripes_a_shot = 40, runs_a_shot = 64;
+  static constexpr std::size_t samples_across = 11, samples_a_shot = 128;
   void add_runs(const geometry::RigidMotion& world_from_scanner, const ShotView&) MOLDLOFT_NONBLOCKING;
+  void add_samples(const geometry::RigidMotion& world_from_scanner, ShotView&) MOLDLOFT_NONBLOCKING;
   static RunEdge edge_at(geometry::RunEnd) MOLDLOFT_NONBLOCKING;
 
-  std::uint16_t stripe_stride_;  // of the stripes whose runs are kept
-  std::uint32_t sample_stride_;  // of stripes and points in the lattice
   RunEvidence kept_;
 };
 

@@ -110,7 +110,7 @@ std::size_t ShotView::next_kind() const {
 
 bool ShotView::end() {
   stage_ = Stage::done;
-  rewind(1);
+  rewind({});
   return true;
 }
 
@@ -127,8 +127,8 @@ Eigen::Vector3d ShotView::last_of(const PlateRun& run) const {
   return is_edge(run.at_last) ? run.edge_last : point_of(run, run.last);
 }
 
-void ShotView::rewind(std::uint32_t stride) {
-  stride_ = stride;
+void ShotView::rewind(const Lattice& lattice) {
+  lattice_ = lattice;
   run_ = 0;
   point_ = runs_.empty() ? 0 : runs_.front().first;
 }
@@ -160,7 +160,7 @@ std::size_t ShotView::next(std::span<Eigen::Vector3d> out) {
   std::size_t count = 0;
   while (count < out.size() && run_ < runs_.size()) {
     const PlateRun& run = runs_[run_];
-    if (point_ > run.last || run.stripe % stride_ != 0) {
+    if (point_ > run.last || (run.stripe - lattice_.first_stripe) % lattice_.stripe_stride != 0) {
       if (++run_ < runs_.size()) point_ = runs_[run_].first;
       continue;
     }
@@ -168,7 +168,7 @@ std::size_t ShotView::next(std::span<Eigen::Vector3d> out) {
     if (std::isfinite(stripe.z[point_]) && within_margins(run, point_) && !is_outlier(run, point_)) {
       out[count++] = {stripe.x[point_], stripe.y[point_], stripe.z[point_]};
     }
-    point_ += stride_;
+    point_ += lattice_.point_stride;
   }
   return count;
 }

@@ -51,8 +51,12 @@ class ShotView {
   Eigen::Vector3d last_of(const geometry::PlateRun&) const MOLDLOFT_NONBLOCKING;
 
   // Walks through the good points on the plate, away from its edges. next() fills `out` with as many as fit and returns
-  // how many; 0 when all have been given. Takes every `stride`-th stripe and point.
-  void rewind(std::uint32_t stride) MOLDLOFT_NONBLOCKING;
+  // how many; 0 when all have been given.
+  struct Lattice {
+    std::uint32_t stripe_stride = 1, point_stride = 1;
+    std::uint32_t first_stripe = 0;  // the strides are counted from here
+  };
+  void rewind(const Lattice&) MOLDLOFT_NONBLOCKING;
   std::size_t next(std::span<Eigen::Vector3d> out) MOLDLOFT_NONBLOCKING;
 
   std::size_t bytes() const;
@@ -79,7 +83,8 @@ class ShotView {
   hal::Scanner* unpacks_ = nullptr;
   Stage stage_ = Stage::done;
   std::size_t run_ = 0;  // where the walk stands
-  std::uint32_t point_ = 0, stride_ = 1;
+  std::uint32_t point_ = 0;
+  Lattice lattice_;
 };
 
 }  // namespace moldloft::tasks

@@ -40,7 +40,7 @@ void SurfaceTask::begin() {
 
 void SurfaceTask::keep(ShotView& shot, const geometry::RigidMotion& world_from_scanner, FrameLease lease) {
   if (reserve_ends_.size() == reserve_ends_.capacity()) return;  // the tracker gives up before this
-  shot.rewind(settings_.reserve_stride);
+  shot.rewind({.stripe_stride = settings_.reserve_stride, .point_stride = settings_.reserve_stride});
   keeping_from_ = &shot;
   kept_ = std::move(lease);
   world_from_scanner_ = world_from_scanner;
@@ -74,7 +74,7 @@ void SurfaceTask::build_outline(std::span<const Eigen::Vector2d> edges,
 void SurfaceTask::fold(ShotView& shot, const geometry::RigidMotion& world_from_scanner, FrameLease lease) {
   assert(stage_ == Stage::open || stage_ == Stage::failed);
   if (stage_ != Stage::open) return;
-  shot.rewind(1);
+  shot.rewind({});
   shot_ = &shot;
   folded_ = std::move(lease);
   world_from_scanner_ = world_from_scanner;

@@ -23,17 +23,18 @@ struct FlatWorld {
     return true;
   }
 
-  // 100 stripes of 500 points over 102 x 102 mm, in scanner coordinates.
-  void expose(const geometry::RigidMotion& world_from_scanner, hal::Frame& frame) const {
-    frame.stripe_count = 100;
-    frame.point_count = 50000;
+  // Stripes over 102 x 102 mm, in scanner coordinates.
+  void expose(const geometry::RigidMotion& world_from_scanner, hal::Frame& frame,
+              std::uint32_t stripes = 100, std::uint32_t points = 500) const {
+    frame.stripe_count = static_cast<std::uint16_t>(stripes);
+    frame.point_count = stripes * points;
     const double height = world_from_scanner.translation().z();
-    for (std::uint32_t s = 0; s < 100; ++s) {
-      frame.stripes[s] = {.index = static_cast<std::uint16_t>(s), .first = s * 500, .count = 500};
-      for (std::uint32_t i = 0; i < 500; ++i) {
-        const double x = -51 + 102 * s / 99.0, y = -51 + 102 * i / 499.0;
+    for (std::uint32_t s = 0; s < stripes; ++s) {
+      frame.stripes[s] = {.index = static_cast<std::uint16_t>(s), .first = s * points, .count = points};
+      for (std::uint32_t i = 0; i < points; ++i) {
+        const double x = -51 + 102.0 * s / (stripes - 1), y = -51 + 102.0 * i / (points - 1);
         const Eigen::Vector3d p = world_from_scanner * Eigen::Vector3d{x, y, 0};
-        const std::size_t k = s * 500 + i;
+        const std::size_t k = s * points + i;
         frame.x[k] = static_cast<float>(x);
         frame.y[k] = static_cast<float>(y);
         frame.z[k] = static_cast<float>((inside(p.head<2>()) ? plate_z : table_z) - height);

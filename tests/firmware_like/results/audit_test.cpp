@@ -5,6 +5,8 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 using namespace moldloft;
 using namespace moldloft::firmware_like;
@@ -301,4 +303,57 @@ TEST_CASE("shots that all scatter a little in height are told together") {
   CHECK(says(found(audit(r), FindingKind::shot_heights), "scatter 0.022 mm rms"));
   r.promised.repeatability_z_mm = 0.02;
   CHECK(audit(r).empty());
+}
+
+TEST_CASE("shots that contradict each other without a pattern are held") {
+  for (const bool in_plan : {false, true}) {
+    CAPTURE(in_plan);
+    // A scanner with a loose screw: every shot is off by something else.
+    MadeUpRun run;
+    run.plate_moves = [&](std::size_t shot) {
+      const double off = 3 * std::sin(7.0 * static_cast<double>(shot * shot % 31));
+      return in_plan ? shifted(off, -off, 0) : shifted(0, 0, off / 5);
+    };
+    RunResult r = run.result();
+    take_audit(r);
+    INFO(texts(r.findings));
+    CHECK(r.outcome == Outcome::held);
+    CHECK(std::ranges::any_of(r.findings, [](const Finding& f) {
+      return f.gravity == Gravity::untrusted && says(&f, "contradict the others, by up to") &&
+             says(&f, "check [scanner.mount]");
+    }));
+  }
+}
+
+TEST_CASE("a corner that is rounded by a few millimetres only is named at its place") {
+  for (const double radius : {0.5, 2.5, 3.3}) {
+    CAPTURE(radius);
+    RunResult r = MadeUpRun{}.result();
+    const Eigen::Vector2d middle = plate_at + Eigen::Vector2d{radius, radius};
+    std::erase_if(r.track.edge_points, [&](const Eigen::Vector2d& p) { return (p - plate_at).norm() < 6; });
+    for (double along = radius; along < 6; along += 0.8) {
+      r.track.edge_points.push_back(plate_at + Eigen::Vector2d{along, 0});
+      r.track.edge_points.push_back(plate_at + Eigen::Vector2d{0, along});
+    }
+    for (const double angle : {0.3, 0.55, 0.785, 1.02, 1.27})
+      r.track.edge_points.push_back(middle - radius * Eigen::Vector2d{std::cos(angle), std::sin(angle)});
+    take_audit(r);
+    INFO(texts(r.findings));
+    const Finding* blunt = found(r.findings, FindingKind::outline);
+    // The arc's middle lies 0.29 radii from both sides: of half a millimetre nobody can tell.
+    REQUIRE((blunt != nullptr) == (radius > 1));
+    if (blunt == nullptr) continue;
+    CHECK((*blunt->place - plate_at).norm() < 3);
+    CHECK(blunt->size_mm == doctest::Approx(0.29 * radius).epsilon(0.2));
+    CHECK(r.outcome == Outcome::warned);
+  }
+}
+
+TEST_CASE("an outline that cannot be compared with its edge points is not trusted") {
+  RunResult r = MadeUpRun{}.result();
+  r.measured->outline.sides[1].control[1].x() = std::numeric_limits<double>::quiet_NaN();
+  take_audit(r);
+  INFO(texts(r.findings));
+  CHECK(r.outcome == Outcome::held);
+  CHECK(says(found(r.findings, FindingKind::outline), "cannot be compared with the edge points"));
 }

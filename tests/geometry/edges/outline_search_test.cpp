@@ -171,6 +171,34 @@ TEST_CASE("a notch bends no side: what is deep is refused, what is not is named,
   }
 }
 
+TEST_CASE("a rim that is torn all round is taken at the corners that the tracker saw, and named") {
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    CAPTURE(seed);
+    // A panel broken out by hand: teeth of up to 9 mm on every side, and 19 mm out of a corner.
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> width(4, 40), depth(0, 12);
+    Border border;
+    const Border corners = rectangle(1400, 700);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Vector2d side = corners[(i + 1) % 4] - corners[i], way = side.normalized(),
+                     inwards{-way.y(), way.x()};
+      for (double from = i == 0 ? 19 : 9; from < side.norm() - (i == 3 ? 19 : 9);) {
+        const double to = from + width(random), in = depth(random);
+        border.insert(border.end(),
+                      {corners[i] + way * from + inwards * in, corners[i] + way * to + inwards * in});
+        from = to;
+      }
+    }
+    const Found found(border, std::vector<Vector2d>{{12, 14}, {1394, 6}, {1393, 695}, {7, 692}});
+    REQUIRE(found.result.has_value());
+    double torn = 0;
+    for (const OutlineDeviation& d : found.search.deviations())
+      torn += d.kind == Kind::ragged || d.kind == Kind::apart ? d.length_mm : 0;
+    CHECK(torn > 800);
+    for (const Vector2d& corner : corners) CHECK(nearest(found.search.outline().corners, corner) < 20);
+  }
+}
+
 TEST_CASE("a disc has no corners, whatever the tracker took for some") {
   const Border disc = regular(180, 200);
   const Found none(disc, {{200, 0}, {0, 200}, {-200, 0}, {0, -200}, {141, 141}});
