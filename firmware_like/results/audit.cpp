@@ -8,6 +8,7 @@
 #include "geometry/edges/outline_check.hpp"
 #include "geometry/fit/net_choice.hpp"
 #include "geometry/fit/plan_map.hpp"
+#include "tasks/cell/blind_band.hpp"
 #include "tasks/planning/outline_words.hpp"
 
 #include <fmt/format.h>
@@ -30,6 +31,8 @@ constexpr double shortest_miss_mm = 1.5;
 constexpr double corner_reach_mm = 3, blunt_mm = 0.4;
 // Parts of the plate without points, smaller than this in all, are what a tack or a scratch hides.
 constexpr double smallest_unseen_mm2 = 16;
+// Two and a half of these in the height of a corner are what a whole plate's surface stays within.
+constexpr double corner_sigma_mm = 0.03;
 // A surface that leaves its points by less is what the points themselves scatter.
 constexpr double smallest_swing_mm = 0.25;
 constexpr std::size_t most_named = 8;  // of one kind; the rest is counted
@@ -70,11 +73,16 @@ class Audit {
     check_edge_points();
     check_planned_shots();
     check_sight();
+    check_corners();
     check_agreement();
     check_noise();
     check_memory();
     check_net();
-    std::ranges::stable_sort(found_, std::ranges::greater{}, &Finding::gravity);
+    // Of what cannot be trusted the cause comes first: where shots contradict each other, the outline looks wrong too.
+    const auto rank = [](const Finding& f) {
+      return std::pair{f.gravity, f.kind == FindingKind::plate_moved || f.kind == FindingKind::mount};
+    };
+    std::ranges::stable_sort(found_, std::ranges::greater{}, rank);
     return std::move(found_);
   }
 
@@ -101,6 +109,7 @@ class Audit {
   void check_planned_shots();
   void check_sight();
   void check_swings(const std::vector<UnseenPart>&);
+  void check_corners();
   void check_agreement();
   void check_repeatability();
   void say_cause(const Motion&, double worst_mm);
@@ -270,6 +279,22 @@ void Audit::check_swings(const std::vector<UnseenPart>& unseen) {
   add_named(std::move(named), "places");
 }
 
+// Beyond the last points the surface is continued: the finer the net, the less is known of its corners.
+void Audit::check_corners() {
+  for (std::size_t i = 0; i < plate_.outline.corners.size(); ++i) {
+    const double sigma = plate_.fit.corner_sigma_mm[i];
+    if (sigma <= corner_sigma_mm) continue;
+    const Eigen::Vector2d& corner = plate_.outline.corners[i];
+    add({.kind = FindingKind::between_points,
+         .place = corner,
+         .size_mm = sigma,
+         .text =
+             fmt::format("the surface's height in the corner at {} has a standard deviation of {:.2f} mm: "
+                         "few points lie near it",
+                         place_text(corner), sigma)});
+  }
+}
+
 // Of the mean of its samples: the arm's repeatability, the points' noise, and what the net may miss.
 double Audit::height_limit(const ShotAgreement& a) const {
   const double points = r_.promised.noise_mm / std::sqrt(std::max(1, a.samples));
@@ -291,6 +316,15 @@ void Audit::say_cause(const Motion& m, double worst_mm) {
                       m.shot == 0 ? ""
                                   : fmt::format(", and whether the plate was moved before shot {}",
                                                 r_.evidence.shots[m.shot].number))});
+    case Cause::scale:
+      return add(
+          {.kind = FindingKind::mount,
+           .gravity = Gravity::untrusted,
+           .place = {},
+           .size_mm = worst_mm,
+           .text = fmt::format("shots disagree by {:.1f} mm, as if the scanner's lengths were {:.1f} % too "
+                               "{}: calibrate the scanner",
+                               worst_mm, 100 * std::abs(m.scale), m.scale > 0 ? "large" : "small")});
     case Cause::drift:
       return add({.kind = FindingKind::shot_heights,
                   .gravity = Gravity::untrusted,
@@ -344,6 +378,14 @@ void Audit::check_agreement() {
     }
   }
   check_repeatability();
+  if (const auto band = tasks::blind_band(r_.evidence, r_.track.field_y_mm))
+    return add(
+        {.kind = FindingKind::unseen,
+         .place = {},
+         .size_mm = band->share(r_.track.field_y_mm) * r_.track.field_y_mm,
+         .text = fmt::format("from shot {} on the scanner shows no points in {:.0f} % of its field, all "
+                             "on one side: look at its window and shutter",
+                             r_.evidence.shots[band->shot].number, 100 * band->share(r_.track.field_y_mm))});
   const double scatter = plate_.fit.sigma_mm / r_.promised.noise_mm;
   if (highest == nullptr && farthest == nullptr && scatter < most_noise) return;
   const Motion cause =

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <span>
+#include <utility>
 
 namespace moldloft::firmware_like {
 namespace {
@@ -17,6 +18,8 @@ constexpr double ridge = 1;
 // A mount that explains so much of what the best model does is believed. A plate that seems to move where the sweep
 // begins, and the head turns, looks much the same: there less is enough.
 constexpr double mount_share = 0.97, mount_share_at_sweep = 0.6;
+// One unknown explains nothing by chance that six do.
+constexpr double scale_share = 0.9;
 
 // Of a body: shift along x, y and z, then turn about x, y and z in units of 1 / length_scale_mm.
 using Row = Eigen::Matrix<double, 6, 1>;
@@ -120,6 +123,13 @@ struct Observations {
     const auto scanner_from_world = evidence.shots[o.shot].world_from_scanner.inverse();
     return body_row(scanner_from_world.linear() * o.along, scanner_from_world * o.point, {0, 0, 0});
   }
+  // In the scanner's own frame, too: all lengths too large.
+  Row scale_row(const Observation& o) const {
+    const auto scanner_from_world = evidence.shots[o.shot].world_from_scanner.inverse();
+    Row row = Row::Zero();
+    row[0] = (scanner_from_world.linear() * o.along).dot(scanner_from_world * o.point) / length_scale_mm;
+    return row;
+  }
   // Sums of every shot, with rows as `row_of` makes them.
   template <typename R, typename RowOf>
   std::vector<Sums<R>> sums(RowOf row_of) const {
@@ -190,6 +200,12 @@ Motion drift(const Observations& o, double disagreement) {
   });
 }
 
+Motion scale(const Observations& o, double disagreement) {
+  Motion m = with(Cause::scale, o, disagreement, [&](const Observation& seen) { return o.scale_row(seen); });
+  m.scale = std::exchange(m.shift_mm.x(), 0.0) / length_scale_mm;
+  return m;
+}
+
 Motion mount(const Observations& o, double disagreement) {
   return with(Cause::mount, o, disagreement, [&](const Observation& seen) { return o.mount_row(seen); });
 }
@@ -209,6 +225,8 @@ Motion best_motion(const tasks::RunEvidence& evidence, const std::vector<SeenEdg
   const Motion by_mount = mount(o, disagreement);
   Motion best = moved(o, disagreement);
   if (const Motion by_drift = drift(o, disagreement); by_drift.explained > best.explained) best = by_drift;
+  const Motion by_scale = scale(o, disagreement);
+  if (by_scale.explained > scale_share * std::max(best.explained, by_mount.explained)) return by_scale;
   const auto& shots = evidence.shots;
   const bool at_sweep = best.cause == Cause::moved && shots[best.shot].purpose == hal::ShotPurpose::surface &&
                         shots[best.shot - 1].purpose != hal::ShotPurpose::surface;

@@ -1,9 +1,10 @@
-// Why shots do not agree: models of it, each linear in six unknowns, fitted to how far every edge lies from the outline
-// and every sample from the surface.
+// Why shots do not agree: models of it, each linear in at most six unknowns, fitted to how far every edge lies from the
+// outline and every sample from the surface.
 //
 //   moved    from one shot on the plate lies elsewhere: shift and turn in plan, lift and tilt; every shot is tried
 //   drift    shift and turn, lift and tilt grow from shot to shot
 //   mount    every shot is shifted, turned and tilted alike in the scanner's own frame
+//   scale    every shot is too large or too small, about the scanner's own origin
 //
 // Outline and surface are made of the same shots and have taken in a part of either, so a figure is good to some tenths
 // of itself. What is asked is which model explains most.
@@ -25,7 +26,7 @@
 
 namespace moldloft::firmware_like {
 
-enum class Cause : std::uint8_t { moved, drift, mount };
+enum class Cause : std::uint8_t { moved, drift, mount, scale };
 
 struct Motion {
   Cause cause{};
@@ -37,6 +38,7 @@ struct Motion {
   double turn_rad = 0;
   double lift_mm = 0;  // of the plate's middle
   Eigen::Vector2d tilt_rad{0, 0};
+  double scale = 0;  // what lengths have too much, as a share of themselves
 };
 
 struct Expected {  // standard deviations of what is compared when all is well

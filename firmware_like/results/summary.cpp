@@ -30,6 +30,7 @@ void put_measured(Json& j, const RunResult& r) {
                   {"tolerance_mm", plate.tolerance_mm},
                   {"smallest_pivot", fit.smallest_pivot},
                   {"empty_cells", fit.empty_cells},
+                  {"corner_sigma_mm", fit.corner_sigma_mm},
                   {"shot_offset_rms_mm", rounded(fit.shot_offset_rms_mm)},
                   {"shot_offset_max_mm", rounded(fit.shot_offset_max_mm)},
                   {"ready_after_last_frame_ms",
@@ -56,6 +57,7 @@ MeasuredPlate read_measured(const Json& j) {
   plate.tolerance_mm = surface.at("tolerance_mm");
   fit.smallest_pivot = surface.at("smallest_pivot");
   fit.empty_cells = surface.at("empty_cells");
+  fit.corner_sigma_mm = surface.value("corner_sigma_mm", fit.corner_sigma_mm);
   fit.shot_offset_rms_mm = surface.at("shot_offset_rms_mm");
   fit.shot_offset_max_mm = surface.at("shot_offset_max_mm");
   plate.ready_after_last_frame =

@@ -319,6 +319,7 @@ void BoundaryViewer::describe(const Cuts& cuts, bool hidden_first, bool hidden_l
     const std::size_t to = k + 2 == count ? cuts.at[count - 1] : (cuts.at[k] + cuts.at[k + 1]) / 2;
     piece.hidden_first = k == 1 && hidden_first;
     piece.hidden_last = k + 2 == count && hidden_last;
+    piece.goes_on = k + 2 < count;
     describe_corner(from, cuts.at[k], to, piece, settings);
   }
 }

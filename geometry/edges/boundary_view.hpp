@@ -41,6 +41,7 @@ struct BoundaryPiece {
   // Kind::corner: where the lines of both sides meet, extrapolated if need be.
   Eigen::Vector2d corner = Eigen::Vector2d::Zero();
   std::uint32_t points_before = 0;  // Kind::corner: points on the first side, the rest lie on the second
+  bool goes_on = false;             // the piece whose first point follows its last is the boundary's next
   bool hidden_first = false, hidden_last = false;  // the boundary goes on unseen between stripes at this end
   double rms_mm = 0;                               // residual about the one line or the two
 };

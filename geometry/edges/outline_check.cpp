@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 // Vectors grow within what their constructor has reserved, which the compiler cannot know.
 MOLDLOFT_GEOMETRY_CHECKED_AT_RUN_TIME
@@ -18,7 +19,7 @@ constexpr double least_bin_mm = 2;  // edge points of one shot lie 1.4 mm apart
 constexpr int foot_iterations = 3;
 constexpr std::size_t fewest_teeth = 3;
 // Round more than one corner: a plate of another smooth shape crosses the four sides of its outline eight times.
-constexpr int turns_of_teeth = 12;
+constexpr int turns_of_teeth = 12, fewest_turns = 3;
 constexpr double small_corner_mm = 12;
 constexpr double least_spread = 0.15;   // of the chord; points all along it have 0.29
 constexpr std::size_t margin_bins = 2;  // a notch's walls stand over the ends of its mouth
@@ -91,6 +92,7 @@ struct OutlineCheck::Foot {
 
 struct OutlineCheck::Bin {
   std::uint32_t on = 0, off = 0;
+  std::uint32_t inside = 0;  // of those that are off
 };
 
 // A stretch of the boundary that misses, in bins from first_bin_ on.
@@ -101,8 +103,6 @@ struct OutlineCheck::Run {
   double inwards = 0, outwards = 0;
   Vector2d reference = Vector2d::Zero();
   int corner = -1;
-  int turns = 0;  // how often points on one side of the outline follow points on the other
-  bool is_inside = false;
   Moments moments;
 };
 
@@ -223,6 +223,7 @@ void OutlineCheck::project_chunk() {
       corner_gap_[i] = std::min(corner_gap_[i], (p - outline_->sides[i].control.front()).norm());
     Bin& bin = bins_[bin_of(foot.station)];
     ++(std::abs(foot.inwards) <= settings_.limit_mm ? bin.on : bin.off);
+    if (foot.inwards > settings_.limit_mm) ++bin.inside;
   }
   if (next_ < points_.size()) return;
   first_bin_ = clean_bin();
@@ -385,9 +386,6 @@ void OutlineCheck::gather_chunk() {
       if (best == nullptr || best->beside) best = &run;
     }
     if (best == nullptr) continue;
-    const bool is_inside = foot.inwards > 0;
-    if (best->points > 0 && is_inside != best->is_inside) ++best->turns;
-    best->is_inside = is_inside;
     ++best->points;
     best->inwards = std::max(best->inwards, static_cast<double>(foot.inwards));
     best->outwards = std::max(best->outwards, static_cast<double>(-foot.inwards));
@@ -451,8 +449,16 @@ bool OutlineCheck::is_ragged(const Run& run) const {
     const auto within = [&](double at) { return at > begin && at < end; };
     return within(corner) || within(corner + station_[4]);
   });
-  const int fewest = goes_round ? turns_of_teeth : static_cast<int>(fewest_teeth);
-  return run.turns >= fewest && end - begin < settings_.tooth_mm * run.turns;
+  int turns = 0;
+  std::optional<bool> was_inside;
+  for (std::size_t k = run.begin; k < run.end; ++k) {
+    const Bin& bin = bins_[(first_bin_ + k) % bins_used_];
+    if (bin.off == 0) continue;
+    const bool is_inside = 2 * bin.inside > bin.off;
+    if (was_inside && is_inside != *was_inside) ++turns;
+    was_inside = is_inside;
+  }
+  return turns >= (goes_round ? turns_of_teeth : fewest_turns) && end - begin < settings_.tooth_mm * turns;
 }
 
 // What stands where the corner should be: a line, an arc, or neither.

@@ -28,11 +28,13 @@ NetSolver::NetSolver(std::size_t max_unknowns, std::size_t max_half_band)
     : matrix_(max_unknowns, max_half_band),
       right_(max_unknowns),
       data_diagonal_(max_unknowns),
-      column_sums_(max_unknowns) {}
+      column_sums_(max_unknowns),
+      corner_(max_unknowns) {}
 
 std::size_t NetSolver::bytes() const {
-  return matrix_.bytes() +
-         (right_.capacity() + data_diagonal_.capacity() + column_sums_.capacity()) * sizeof(double);
+  return matrix_.bytes() + (right_.capacity() + data_diagonal_.capacity() + column_sums_.capacity() +
+                            corner_.capacity()) *
+                               sizeof(double);
 }
 
 bool NetSolver::holds(const SplineNet& net) const {
@@ -290,6 +292,29 @@ bool NetSolver::step_shots() {
   }
 }
 
+int NetSolver::corner_unknown(int corner) const {
+  const SplineNet& net = *task_.net;
+  return net.index(corner == 1 || corner == 2 ? net.control_u() - 1 : 0,
+                   corner >= 2 ? net.control_v() - 1 : 0);
+}
+
+// The variance of a coefficient is the diagonal entry of the inverse: the square of L^-1 e, which begins at e's own
+// row. True when all four are done.
+bool NetSolver::step_corners() {
+  const int n = size(), unknown = corner_unknown(column_);
+  if (cursor_ == 0) {
+    std::fill(corner_.begin(), corner_.begin() + n, 0.0);
+    corner_[static_cast<std::size_t>(unknown)] = 1;
+    cursor_ = unknown;
+  }
+  if (!advance(n, task_.net->half_band(), [&](int a, int b) { matrix_.solve_lower(corner_, a, b); })) return false;
+  result_.corner_sigma_mm[static_cast<std::size_t>(column_)] =
+      result_.point_sigma_mm * ConstVector(corner_.data(), n).norm();
+  if (++column_ < 4) return false;
+  column_ = 0;
+  return true;
+}
+
 std::expected<bool, Error> NetSolver::step(double budget) {
   work_ = 0, budget_ = budget, full_ = false;
   // The phases of a small net are far shorter than a step: it takes as many as fit.
@@ -376,7 +401,10 @@ std::expected<bool, Error> NetSolver::piece() {
       return false;
     case Phase::backward:
       if (advance(n, band, [&](int a, int b) { matrix_.solve_upper(right_, n - b, n - a); }))
-        phase_ = Phase::energy;
+        phase_ = task_.boundary.empty() ? Phase::corners : Phase::energy;
+      return false;
+    case Phase::corners:
+      if (step_corners()) phase_ = Phase::energy, cursor_ = 0;
       return false;
     case Phase::energy:
       if (fairing_ <= 0 ||

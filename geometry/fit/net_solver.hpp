@@ -17,6 +17,7 @@
 #include "geometry/fit/spline_net.hpp"
 #include "geometry/splines/band_cholesky.hpp"
 
+#include <array>
 #include <cstdint>
 #include <expected>
 #include <limits>
@@ -52,6 +53,9 @@ struct NetResult {
   double point_sigma_mm = 0;
   double smallest_pivot = 0;  // relative to the largest
   int smallest_pivot_unknown = 0;
+  // Standard deviation of the height at (0, 0), (1, 0), (1, 1), (0, 1) from the points' noise: a corner of the surface
+  // is one coefficient, and no point lies beyond it. 0 where the ring is given. Offsets are taken as known.
+  std::array<double, 4> corner_sigma_mm{};
   int empty_cells = 0, sparse_cells = 0;  // without points; with some, but fewer than sparse_points
   double offset_rms_mm = 0, offset_max_mm = 0;
 };
@@ -96,6 +100,7 @@ class NetSolver {
     schur,
     offsets,
     backward,
+    corners,
     energy,
     sparse_energy,
     done,
@@ -115,6 +120,8 @@ class NetSolver {
   void subtract_sparse_energy(int row);
   void estimate_noise(double y_squared);
   void take_offsets();
+  bool step_corners();
+  int corner_unknown(int corner) const;
   bool step_shots();
   // The cells of one shot after the other, until the step is full; true when all are done.
   template <typename Piece>
@@ -125,7 +132,7 @@ class NetSolver {
   ShotOffsets* shots_ = nullptr;
   NetResult result_;
   BandCholesky matrix_;
-  std::vector<double> right_, data_diagonal_, column_sums_;
+  std::vector<double> right_, data_diagonal_, column_sums_, corner_;
   Phase phase_ = Phase::done;
   int cursor_ = 0, column_ = 0, row_ = 0;
   std::size_t shot_cell_ = 0;

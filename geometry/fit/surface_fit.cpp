@@ -255,6 +255,7 @@ void SurfaceFit::Work::finish() {
   report.rms_residual_mm = score.rms_residual, report.sigma_mm = score.sigma;
   report.smallest_pivot = score.smallest_pivot;
   report.empty_cells = score.empty_cells;
+  report.corner_sigma_mm = chosen.result.corner_sigma_mm;
   report.shot_offset_rms_mm = chosen.result.offset_rms_mm;
   report.shot_offset_max_mm = chosen.result.offset_max_mm;
   report.shots_without_offset = shots.exact();

@@ -54,6 +54,7 @@ struct SurfaceFitReport {
   double sigma_mm = 0;                         // noise of one point: residual over the degrees of freedom
   double smallest_pivot = 0;  // relative to the largest: small means a badly determined control point
   int empty_cells = 0;        // of the chosen net
+  std::array<double, 4> corner_sigma_mm{};  // of the height at the outline's corners, from the points' noise
   double shot_offset_rms_mm = 0, shot_offset_max_mm = 0;
   int shots_without_offset = 0;  // taken as exact, since the memory plan had no room for their moments
 };

@@ -128,7 +128,10 @@ void compare_grid(const PlateInstance& truth, const BSplineSurface& measured, Ve
       const Eigen::Vector3d n = world_from_plate.linear() * truth.plate->normal(q.x(), q.y());
       entry.normal_mm = along_normal(measured, p, n, *uv);
       squares += entry.normal_mm * entry.normal_mm;
-      verdict.normal_max_mm = std::max(verdict.normal_max_mm, std::abs(entry.normal_mm));
+      if (std::abs(entry.normal_mm) > verdict.normal_max_mm) {
+        verdict.normal_max_mm = std::abs(entry.normal_mm);
+        verdict.normal_max_at = entry.world;
+      }
       ++verdict.points;
     }
   }

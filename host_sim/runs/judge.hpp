@@ -28,7 +28,8 @@ struct Deviation {
 
 struct Verdict {
   double normal_max_mm = 0, normal_rms_mm = 0, outline_max_mm = 0, corner_max_mm = 0;
-  int points = 0;               // of the grid that were compared
+  Eigen::Vector2d normal_max_at{0, 0};  // mm, plan
+  int points = 0;                       // of the grid that were compared
   std::vector<Deviation> grid;  // judge_grid rows of judge_grid, for a picture
 };
 

@@ -25,6 +25,7 @@ constexpr int ticks_between_reports = 200;
 Json truth_json(const Verdict& v) {
   return {{"normal_max_mm", v.normal_max_mm},
           {"normal_rms_mm", v.normal_rms_mm},
+          {"normal_max_at_mm", {v.normal_max_at.x(), v.normal_max_at.y()}},
           {"outline_max_mm", v.outline_max_mm},
           {"corner_max_mm", v.corner_max_mm},
           {"points", v.points}};

@@ -1,6 +1,7 @@
 #include "tasks/cell/measurement.hpp"
 
 #include "hal/base/reserved.hpp"
+#include "tasks/cell/blind_band.hpp"
 #include "tasks/planning/flaw_words.hpp"
 #include "tasks/planning/tool_pose.hpp"
 
@@ -61,8 +62,8 @@ Measurement::Measurement(const CellSettings& settings, Supervisor& supervisor, S
       shots_{shots},
       tracker_{settings.tracker},
       view_{settings.max_stripes, settings.max_points, settings.view},
-      evidence_{
-          {.max_shots = static_cast<std::size_t>(settings.tracker.max_shots) + 1 + settings.max_surface_shots}},
+      evidence_{{.max_shots =
+                     static_cast<std::size_t>(settings.tracker.max_shots) + 1 + settings.max_surface_shots}},
       surface_places_(settings.max_surface_shots),
       time_left_{settings.tracker, settings.scan} {
   boundary_places_.reserve(static_cast<std::size_t>(settings.tracker.max_shots) + 1);
@@ -150,7 +151,7 @@ void Measurement::seek() {
   plan_begun_ = false;
   heights_.reset();
   evidence_.begin();
-  health_ = {};
+  health_ = last_seen_ = {};
   has_seen_ = false;
   spent_ = hal::Duration{0};
   time_left_.begin(settings_.start.centre.head<2>());
@@ -231,7 +232,7 @@ void Measurement::use_view() {
 // No two exposures have the same noise: the same heights again are the same frame again.
 bool Measurement::is_of_a_sound_scanner() {
   const FrameHealth before = std::exchange(health_, health_of(view_.frame()));
-  has_seen_ = has_seen_ || !is_blind(health_);
+  if (!is_blind(health_)) has_seen_ = true, last_seen_ = health_;
   if (health_.noise_mm == 0 || health_.fingerprint != before.fingerprint) return true;
   supervisor_.hold(HoldCause::measurement,
                    hal::Message::format("the scanner sends the same frame again (shot {}): restart it, then "
@@ -243,8 +244,14 @@ bool Measurement::is_of_a_sound_scanner() {
 // A plate that cannot be tracked is no news where the scanner itself is at fault. One empty frame is no fault: it may
 // look beside the plate.
 void Measurement::hold_for_plate(HoldCause cause, const hal::Message& what) {
-  auto fault = scanner_fault(health_, settings_.view.runs.noise_mm);
-  if (has_seen_ && is_blind(health_)) fault.reset();
+  auto fault = scanner_fault(has_seen_ ? last_seen_ : health_, settings_.view.runs.noise_mm);
+  if (!fault) {
+    if (const auto band = blind_band(evidence_.evidence(), settings_.scan.field_y_mm))
+      fault = hal::Message::format(
+          "from shot {} on the scanner shows no points in {:.0f} % of its field, all on one side: look at its "
+          "window and shutter",
+          evidence_.evidence().shots[band->shot].number, 100 * band->share(settings_.scan.field_y_mm));
+  }
   supervisor_.hold(fault ? HoldCause::measurement : cause, fault.value_or(what));
 }
 

@@ -118,6 +118,7 @@ class Measurement final : public ShotUser {
   ZigzagPlan zigzag_;
   bool plan_begun_ = false;  // the zig-zag's
   FrameHealth health_;       // of the last frame
+  FrameHealth last_seen_;    // of the last that was not blind
   bool has_seen_ = false;    // points, in any frame of the run
   std::array<int, 3> taken_{};
   std::uint64_t points_seen_ = 0;

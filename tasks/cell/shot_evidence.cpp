@@ -59,11 +59,11 @@ RunEdge EvidenceBook::edge_at(geometry::RunEnd end) {
 void EvidenceBook::add_runs(const geometry::RigidMotion& world_from_scanner, const ShotView& view) {
   const auto runs = view.runs();
   if (runs.empty()) return;
-  const std::uint32_t first = runs.front().stripe,
-                      stride = stride_for(runs.back().stripe - first + 1, stripes_a_shot);
+  const std::uint32_t from = runs.front().stripe,
+                      stride = stride_for(runs.back().stripe - from + 1, stripes_a_shot);
   std::size_t left = runs_a_shot;
   for (const geometry::PlateRun& run : runs) {
-    if ((run.stripe - first) % stride != 0) continue;
+    if ((run.stripe - from) % stride != 0) continue;
     if (left-- == 0) return;
     const Eigen::Vector3d first = view.first_of(run), last = view.last_of(run);
     hal::add_within_reserve(kept_.runs, SeenRun{.first = world_from_scanner * first,

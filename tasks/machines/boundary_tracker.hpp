@@ -17,9 +17,11 @@
 #include "hal/base/fixed_text.hpp"
 #include "hal/base/realtime.hpp"
 #include "hal/base/transition.hpp"
+#include "tasks/machines/loop_closure.hpp"
 
 #include <Eigen/Core>
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -43,12 +45,14 @@ enum class TrackEvent : std::uint8_t {
   no_plate,           // the hint hit nothing
   plate_fills_field,  // plate, but no edge
   side,
-  corner,       // the piece that is being followed, and how it ends: at the field's limit
-  hidden,       // ... or hidden between stripes
-  loop_closed,  // the piece passes where the outline began
-  beyond_plan,  // no room is left for the edge points that it shows, or for another shot
+  corner,         // the piece that is being followed, and how it ends: at the field's limit
+  hidden,         // ... or hidden between stripes
+  loop_closed,    // the piece passes where the outline began
+  passes_beside,  // it passes there, but millimetres beside
+  hole_closed,    // it does, but round a hole
+  beyond_plan,    // no room is left for the edge points that it shows, or for another shot
 };
-constexpr int track_event_count = 7;
+constexpr int track_event_count = 9;
 
 enum class TrackAction : std::uint8_t {
   none,
@@ -57,6 +61,9 @@ enum class TrackAction : std::uint8_t {
   change_height,
   centre_on_edge,
   begin_outline,
+  look_past_hole,
+  leave_hole,
+  begin_again,
   advance,
   turn,
   back_up,
@@ -66,11 +73,14 @@ enum class TrackAction : std::uint8_t {
   report_lost,
   report_hidden,
   report_too_large,
+  report_open,
 };
 
 struct TrackContext {
   int seek_steps = 0, half_steps = 0, turns = 0, backs = 0, heights = 0;
   int max_seek_steps = 0, max_half_steps = 0, max_turns = 0, max_backs = 0, max_heights = 0;
+  int rounds = 0;           // gone beside the beginning
+  bool is_far_off = false;  // so far beside that the beginning was no edge of the plate
 };
 
 using TrackTransition = hal::Transition<TrackState, TrackEvent, TrackAction, TrackContext>;
@@ -87,8 +97,10 @@ struct TrackerSettings {
       0.785;  // rad: stripes cross the boundary at 45 degrees, so that a square corner shows both sides
   double min_crossing = 0.44;  // rad: below 25 degrees edge points become rare, the head is turned
   double seek_step_mm = 70;
-  double close_mm = 8;          // the loop is closed where a piece passes this near to its beginning
-  double corner_merge_mm = 20;  // corners nearer than this are one, seen twice
+  double close_mm = 8;           // the loop is closed where a piece passes this near to its beginning
+  double corner_merge_mm = 20;   // corners nearer than this are one, seen twice
+  double progress_mm = 3;        // a shot that leads on by less shows nothing new
+  std::size_t max_corners = 64;  // of more, the sharpest are kept
   // The field's centre stays between these; a plate that is not seen at one height is sought a storey higher or lower.
   double lowest_z_mm = -std::numeric_limits<double>::infinity();
   double highest_z_mm = std::numeric_limits<double>::infinity();
@@ -128,22 +140,37 @@ class BoundaryTracker {
   std::size_t bytes() const;
 
  private:
-  struct Piece {  // the piece that is being followed, in world coordinates
-    const geometry::BoundaryPiece* piece = nullptr;
+  // What is being followed, in world coordinates: the piece that passes nearest, and those that go on from it.
+  struct Course {
+    static constexpr std::size_t most_pieces = 9;
+    std::array<const geometry::BoundaryPiece*, most_pieces> pieces{};
+    std::size_t count = 0;
     Eigen::Vector3d nearest, exit;
-    Eigen::Vector2d tangent_first, tangent_last, corner;
+    Eigen::Vector2d tangent_first;
     std::uint32_t nearest_index = 0;
-    double anchor_distance = 0;
+    Eigen::Matrix2d turn = Eigen::Matrix2d::Identity();  // world from scanner, plan view
+    Eigen::Vector2d offset{0, 0};
+    LoopClosure loop;  // after it
+    double farthest_x_mm = 0;
+
+    std::span<const geometry::BoundaryPiece* const> all() const { return {pieces.data(), count}; }
+    bool has_corner() const MOLDLOFT_NONBLOCKING;
+    Eigen::Vector2d heading_at_nearest() const MOLDLOFT_NONBLOCKING;
+    bool hides() const { return pieces[count - 1]->hidden_last; }
   };
-  TrackEvent observe(const Seen&, Piece&);
-  TrackEvent observe_plate(const Seen&, Piece&);
-  Piece follow(const Seen&, const Eigen::Vector2d& from) const;
-  bool passes_anchor(const Seen&, const Piece&) const;
+  TrackEvent observe(const Seen&, Course&);
+  TrackEvent observe_plate(const Seen&, Course&);
+  Course follow(const Seen&, const Eigen::Vector2d& from) const;
+  void end_at_last_piece(const Seen&, Course&) const;
+  std::optional<TrackEvent> come_round(const Seen&, Course&);
+  Eigen::Vector2d point_on_plate(const Course&) const;
   void remember_edges(const Seen&);
-  void remember_corner(const Eigen::Vector2d&);
-  void move_front(const Piece&);
+  void remember_corners(const Course&);
+  void remember_corner(const Eigen::Vector2d&, double turn);
+  void move_front(const Course&);
   ShotPlace seek_on(TrackAction);
-  ShotPlace carry_out(TrackAction, const Piece&);
+  Eigen::Vector3d corner_of_field_along_x() const;
+  ShotPlace carry_out(TrackAction, const Course&);
   ShotPlace ahead() const;
   double healthy_yaw(double yaw) const;
   double yaw_crossing_both(double heading, double stripe) const;
@@ -155,13 +182,16 @@ class BoundaryTracker {
   TrackState state_ = TrackState::seek_edge;
   TrackContext counts_;
   int shots_ = 0;
+  ShotPlace start_;
   ShotPlace place_;  // of the shot that take() is about to look at
   Eigen::Vector3d front_{0, 0, 0}, hint_{0, 0, 0};
-  Eigen::Vector2d heading_{1, 0}, anchor_{0, 0};
+  Eigen::Vector2d heading_{1, 0};
+  LoopClosure loop_;
+  std::optional<Eigen::Vector2d> filled_;  // the last field that the plate filled
+  double farthest_x_mm_ = 0;               // of the boundary since it began
   double plate_z_mm_ = 0;
-  double start_z_mm_ = 0;
-  double turned_ = 0;  // rad, of the heading since the outline began
   std::vector<Eigen::Vector2d> edges_, corners_;
+  std::vector<double> corner_turns_;
 };
 
 }  // namespace moldloft::tasks

@@ -20,6 +20,8 @@ constexpr hal::Guard<TrackContext> may_rise{
     "heights left", [](const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.heights < c.max_heights; }};
 constexpr hal::Guard<TrackContext> may_back{
     "steps back left", [](const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.backs < c.max_backs; }};
+constexpr hal::Guard<TrackContext> from_hole{
+    "began at a hole", [](const TrackContext& c) MOLDLOFT_NONBLOCKING { return c.is_far_off && c.rounds == 0; }};
 
 // clang-format off
 constexpr TrackTransition table[] = {
@@ -39,7 +41,8 @@ constexpr TrackTransition table[] = {
     {S::first_side,   E::hidden,             may_turn, A::turn,              S::first_side},
     {S::first_side,   E::hidden,             any,      A::report_hidden,     S::failed},
     {S::first_side,   E::no_plate,           any,      A::report_lost,       S::failed},
-    {S::first_side,   E::plate_fills_field,  any,      A::report_lost,       S::failed},
+    {S::first_side,   E::plate_fills_field,  may_seek, A::look_past_hole,    S::seek_edge},  // it was a hole's
+    {S::first_side,   E::plate_fills_field,  any,      A::report_no_edge,    S::failed},
     {S::first_side,   E::beyond_plan,        any,      A::report_too_large,  S::failed},
 
     {S::track,        E::side,               any,      A::advance,           S::track},
@@ -47,6 +50,10 @@ constexpr TrackTransition table[] = {
     {S::track,        E::hidden,             may_turn, A::turn,              S::turn_head},
     {S::track,        E::hidden,             any,      A::report_hidden,     S::failed},
     {S::track,        E::loop_closed,        any,      A::finish,            S::closed},
+    {S::track,        E::passes_beside,      from_hole, A::begin_again,      S::track},
+    {S::track,        E::passes_beside,      any,      A::report_open,       S::failed},
+    {S::track,        E::hole_closed,        may_seek, A::leave_hole,        S::seek_edge},
+    {S::track,        E::hole_closed,        any,      A::report_no_edge,    S::failed},
     {S::track,        E::no_plate,           may_back, A::back_up,           S::step_back},
     {S::track,        E::no_plate,           any,      A::report_lost,       S::failed},
     {S::track,        E::plate_fills_field,  may_back, A::back_up,           S::step_back},
@@ -56,6 +63,10 @@ constexpr TrackTransition table[] = {
     {S::turn_head,    E::side,               any,      A::advance,           S::track},
     {S::turn_head,    E::corner,             any,      A::advance,           S::track},
     {S::turn_head,    E::loop_closed,        any,      A::finish,            S::closed},
+    {S::turn_head,    E::passes_beside,      from_hole, A::begin_again,      S::track},
+    {S::turn_head,    E::passes_beside,      any,      A::report_open,       S::failed},
+    {S::turn_head,    E::hole_closed,        may_seek, A::leave_hole,        S::seek_edge},
+    {S::turn_head,    E::hole_closed,        any,      A::report_no_edge,    S::failed},
     {S::turn_head,    E::hidden,             may_turn, A::turn,              S::turn_head},
     {S::turn_head,    E::hidden,             any,      A::report_hidden,     S::failed},
     {S::turn_head,    E::no_plate,           any,      A::report_lost,       S::failed},
@@ -65,6 +76,10 @@ constexpr TrackTransition table[] = {
     {S::step_back,    E::side,               any,      A::advance,           S::track},
     {S::step_back,    E::corner,             any,      A::advance,           S::track},
     {S::step_back,    E::loop_closed,        any,      A::finish,            S::closed},
+    {S::step_back,    E::passes_beside,      from_hole, A::begin_again,      S::track},
+    {S::step_back,    E::passes_beside,      any,      A::report_open,       S::failed},
+    {S::step_back,    E::hole_closed,        may_seek, A::leave_hole,        S::seek_edge},
+    {S::step_back,    E::hole_closed,        any,      A::report_no_edge,    S::failed},
     {S::step_back,    E::hidden,             may_turn, A::turn,              S::turn_head},
     {S::step_back,    E::hidden,             any,      A::report_hidden,     S::failed},
     {S::step_back,    E::no_plate,           may_back, A::back_up,           S::step_back},
@@ -75,18 +90,18 @@ constexpr TrackTransition table[] = {
 };
 
 constexpr hal::Ignored<S, E> ignored[] = {
-    {S::seek_edge, E::loop_closed}, {S::first_side, E::loop_closed}, {S::seek_edge, E::beyond_plan},  // the outline has not begun
-    {S::closed, E::no_plate}, {S::closed, E::plate_fills_field}, {S::closed, E::side}, {S::closed, E::corner}, {S::closed, E::hidden}, {S::closed, E::loop_closed}, {S::closed, E::beyond_plan},
-    {S::failed, E::no_plate}, {S::failed, E::plate_fills_field}, {S::failed, E::side}, {S::failed, E::corner}, {S::failed, E::hidden}, {S::failed, E::loop_closed}, {S::failed, E::beyond_plan},
+    {S::seek_edge, E::loop_closed}, {S::first_side, E::loop_closed}, {S::seek_edge, E::passes_beside}, {S::seek_edge, E::hole_closed}, {S::first_side, E::passes_beside}, {S::first_side, E::hole_closed}, {S::seek_edge, E::beyond_plan},  // the outline has not begun
+    {S::closed, E::no_plate}, {S::closed, E::plate_fills_field}, {S::closed, E::side}, {S::closed, E::corner}, {S::closed, E::hidden}, {S::closed, E::loop_closed}, {S::closed, E::passes_beside}, {S::closed, E::hole_closed}, {S::closed, E::beyond_plan},
+    {S::failed, E::no_plate}, {S::failed, E::plate_fills_field}, {S::failed, E::side}, {S::failed, E::corner}, {S::failed, E::hidden}, {S::failed, E::loop_closed}, {S::failed, E::passes_beside}, {S::failed, E::hole_closed}, {S::failed, E::beyond_plan},
 };
 
 constexpr std::array<std::string_view, track_state_count> state_names = {
     "seek edge", "first side", "track", "turn head", "step back", "closed", "failed"};
 constexpr std::array<std::string_view, track_event_count> event_names = {
-    "no plate", "plate fills field", "side", "corner", "hidden", "loop closed", "beyond plan"};
-constexpr std::array<std::string_view, 15> action_names = {
-    "none", "step along x", "step half along x", "change height", "centre on edge", "begin outline", "advance", "turn", "back up", "finish",
-    "report off plate", "report no edge", "report lost", "report hidden", "report too large"};
+    "no plate", "plate fills field", "side", "corner", "hidden", "loop closed", "passes beside", "hole closed", "beyond plan"};
+constexpr std::array<std::string_view, 19> action_names = {
+    "none", "step along x", "step half along x", "change height", "centre on edge", "begin outline", "look past hole", "leave hole", "begin again", "advance", "turn", "back up", "finish",
+    "report off plate", "report no edge", "report lost", "report hidden", "report too large", "report open"};
 // clang-format on
 
 }  // namespace

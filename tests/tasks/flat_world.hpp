@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 namespace moldloft::tasks {
@@ -14,8 +15,10 @@ namespace moldloft::tasks {
 struct FlatWorld {
   std::vector<Eigen::Vector2d> outline;  // counter-clockwise, convex
   double plate_z = 6, table_z = 0;
+  std::function<bool(const Eigen::Vector2d&)> shape = {};  // instead of the outline
 
   bool inside(const Eigen::Vector2d& p) const {
+    if (shape) return shape(p);
     for (std::size_t i = 0; i < outline.size(); ++i) {
       const Eigen::Vector2d side = outline[(i + 1) % outline.size()] - outline[i], to = p - outline[i];
       if (side.x() * to.y() - side.y() * to.x() < 0) return false;
@@ -24,8 +27,8 @@ struct FlatWorld {
   }
 
   // Stripes over 102 x 102 mm, in scanner coordinates.
-  void expose(const geometry::RigidMotion& world_from_scanner, hal::Frame& frame,
-              std::uint32_t stripes = 100, std::uint32_t points = 500) const {
+  void expose(const geometry::RigidMotion& world_from_scanner, hal::Frame& frame, std::uint32_t stripes = 100,
+              std::uint32_t points = 500) const {
     frame.stripe_count = static_cast<std::uint16_t>(stripes);
     frame.point_count = stripes * points;
     const double height = world_from_scanner.translation().z();

@@ -119,6 +119,54 @@ TEST_CASE("a mount that is shifted, turned or tilted is told from a plate that w
   }
 }
 
+TEST_CASE("a scanner whose lengths are wrong is told from a mount, with how wrong they are") {
+  for (const double scale : {0.95, 1.02, 1.06}) {
+    CAPTURE(scale);
+    MadeUpRun run;
+    RunResult r = run.result();
+    // What a shot shows lies too far from, or too near to, the middle of its field.
+    const auto stretched = [&](std::size_t shot, const Eigen::Vector3d& p) {
+      const auto& motion = r.evidence.shots[shot].world_from_scanner;
+      return Eigen::Vector3d{motion * (scale * (motion.inverse() * p))};
+    };
+    std::uint32_t run_at = 0, sample_at = 0, edge_at = 0;
+    for (std::size_t i = 0; i < r.evidence.shots.size(); ++i) {
+      const auto& shot = r.evidence.shots[i];
+      for (; run_at < shot.runs_end; ++run_at) {
+        auto& seen = r.evidence.runs[run_at];
+        seen.first = stretched(i, seen.first), seen.last = stretched(i, seen.last);
+      }
+      for (; sample_at < shot.samples_end; ++sample_at)
+        r.evidence.samples[sample_at] = stretched(i, r.evidence.samples[sample_at]);
+      for (; edge_at < shot.edges_end; ++edge_at) {
+        const auto& p = r.track.edge_points[edge_at];
+        r.track.edge_points[edge_at] = stretched(i, {p.x(), p.y(), 20}).head<2>();
+      }
+    }
+    take_audit(r);
+    INFO(texts(r.findings));
+    CHECK(r.outcome == Outcome::held);
+    const auto said = r.message.find("lengths were ");
+    REQUIRE(said != std::string::npos);
+    // Outline and surface have taken in a part of it.
+    CHECK(std::stod(r.message.substr(said + 13)) ==
+          doctest::Approx(std::abs(100 * (scale - 1))).epsilon(0.25));
+    CHECK(r.message.find(scale > 1 ? "% too large: calibrate the scanner"
+                                   : "% too small: calibrate the scanner") != std::string::npos);
+  }
+}
+
+TEST_CASE("a corner whose height is not well known is named with its deviation") {
+  RunResult r = MadeUpRun{}.result();
+  r.measured->fit.corner_sigma_mm = {0.01, 0.02, 0.12, 0.03};
+  take_audit(r);
+  INFO(texts(r.findings));
+  CHECK(r.outcome == Outcome::warned);
+  REQUIRE(r.findings.size() == 1);
+  CHECK(says(&r.findings[0], "a standard deviation of 0.12 mm"));
+  CHECK((*r.findings[0].place - r.measured->outline.corners[2]).norm() < 1e-9);
+}
+
 TEST_CASE("an arm that drifts is not taken for a plate that was pushed") {
   MadeUpRun run;
   run.plate_moves = [](std::size_t shot) { return shifted(0, 0.1 * static_cast<double>(shot), 0); };

@@ -208,3 +208,105 @@ TEST_CASE("heads that turn at every place do not outrun the plan's shots") {
   CHECK(tracker.state() == TrackState::failed);
   CHECK(shots + 1 == 12);
 }
+
+namespace {
+
+// 300 x 300 mm about (500, 20), all corners arcs; turned so that no side runs along the stripes.
+bool in_rounded_square(const Vector2d& p, double radius, double turn = 0.3) {
+  const Vector2d d = (Eigen::Rotation2Dd(-turn) * (p - Vector2d(500, 20))).cwiseAbs();
+  const Vector2d beyond = (d - Vector2d::Constant(150 - radius)).cwiseMax(0);
+  return d.maxCoeff() < 150 && beyond.norm() < radius;
+}
+
+}  // namespace
+
+TEST_CASE("a rounded corner costs a shot or two, not fifty") {
+  BoundaryTracker tracker{TrackerSettings{}};
+  const Walk sharp = walk_round(
+      tracker, {.outline = {}, .shape = [](const Vector2d& p) { return in_rounded_square(p, 0.01); }}, start);
+  REQUIRE(sharp.last.to == TrackState::closed);
+  for (const double radius : {3.0, 5.0, 10.0, 20.0, 40.0, 70.0}) {
+    CAPTURE(radius);
+    const FlatWorld world{.outline = {},
+                          .shape = [&](const Vector2d& p) { return in_rounded_square(p, radius); }};
+    const Walk walk = walk_round(tracker, world, start);
+    CHECK(walk.last.to == TrackState::closed);
+    CHECK(walk.shots <= sharp.shots + 4 * 2);
+  }
+}
+
+TEST_CASE("a rim of teeth or scallops is gone round once, however its edge turns") {
+  BoundaryTracker tracker{TrackerSettings{}};
+  for (const double depth : {3.0, 6.0, 12.0}) {
+    for (const double pitch : {20.0, 33.0, 60.0}) {
+      CAPTURE(depth);
+      CAPTURE(pitch);
+      const FlatWorld world{.outline = {}, .shape = [&](const Vector2d& p) {
+                              const Vector2d d = Eigen::Rotation2Dd(-0.3) * (p - Vector2d(500, 20));
+                              const double along = std::abs(d.x()) > std::abs(d.y()) ? d.y() : d.x();
+                              const double in = depth * std::abs(std::sin(3.14159 * along / pitch));
+                              return d.cwiseAbs().maxCoeff() < 150 - in;
+                            }};
+      const Walk walk = walk_round(tracker, world, start);
+      CHECK(walk.last.to == TrackState::closed);
+      CHECK(walk.shots < 60);
+    }
+  }
+}
+
+TEST_CASE(
+    "a plate that was moved on the way round is told by how far from its beginning the edge comes round") {
+  for (const double push : {-30.0, -11.0, 11.0}) {
+    CAPTURE(push);
+    BoundaryTracker tracker{TrackerSettings{}};
+    int shots = 0;
+    hal::Frame frame{100, 50000};
+    ShotView view{100, 50000, {}};
+    ShotPlace place = start;
+    tracker.begin(start);
+    BoundaryTracker::Step last;
+    for (; shots < 100; ++shots) {
+      const auto motion = geometry::turned_about_z(place.head_yaw, place.centre);
+      const double moved = shots < 8 ? 0 : push;
+      const FlatWorld world{.outline = {}, .shape = [&](const Vector2d& p) {
+                              return in_rounded_square(p - Vector2d(moved, 0), 0.01);
+                            }};
+      world.expose(motion, frame);
+      const bool seeking = tracker.state() == TrackState::seek_edge;
+      view.begin(frame, {.hint = motion.inverse() * tracker.plate_hint(), .reach_mm = seeking ? 60.0 : 18.0});
+      while (!view.step()) {
+      }
+      last = tracker.take({.world_from_scanner = motion,
+                           .plate_found = view.found(),
+                           .plate_z_mm = world.plate_z,
+                           .view = view.boundary()});
+      if (!last.next) break;
+      place = *last.next;
+    }
+    CHECK(shots < 30);
+    CHECK(last.event == TrackEvent::passes_beside);
+    CHECK(last.text.view().find("the edge comes round") == 0);
+    CHECK(last.text.view().find("largest_mm") == std::string_view::npos);
+  }
+}
+
+TEST_CASE(
+    "a hole on the way to the edge is left behind, small or large, and the plate's own boundary found") {
+  BoundaryTracker tracker{TrackerSettings{}};
+  for (const double radius : {8.0, 20.0, 35.0, 48.0}) {
+    for (const double x : {540.0, 570.0, 590.0}) {
+      CAPTURE(radius);
+      CAPTURE(x);
+      const FlatWorld world{.outline = {}, .shape = [&](const Vector2d& p) {
+                              return in_rounded_square(p, 0.01) && (p - Vector2d(x, 30)).norm() > radius;
+                            }};
+      const Walk walk = walk_round(tracker, world, {.centre = {460, 20, 5}, .head_yaw = 0});
+      INFO(walk.last.text.view());
+      INFO(walk.shots);
+      CHECK(walk.last.to == TrackState::closed);
+      double widest = 0;
+      for (const auto& p : tracker.edge_points()) widest = std::max(widest, (p - Vector2d(500, 20)).norm());
+      CHECK(widest > 200);
+    }
+  }
+}
