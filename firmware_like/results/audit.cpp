@@ -126,7 +126,8 @@ class Audit {
   std::vector<SeenEdge> edges_;
   std::vector<ShotAgreement> shots_;
   std::vector<Finding> found_;
-  int apart_ = 0;  // places where edge points lie beside the outline and others on it
+  bool is_torn_ = false;  // most of the rim is ragged
+  int apart_ = 0;         // places where edge points lie beside the outline and others on it
 };
 
 void Audit::check_edge_points() {
@@ -148,8 +149,8 @@ void Audit::check_edge_points() {
     ragged_length += d.length_mm;
     teeth = std::max(teeth, d.distance_mm());
   }
-  const bool is_torn = ragged_length > outline_.length_mm() / 2;
-  const double other_shape_mm = is_torn ? std::max(smooth_rim_mm, 1.5 * teeth) : smooth_rim_mm;
+  is_torn_ = ragged_length > outline_.length_mm() / 2;
+  const double other_shape_mm = is_torn_ ? std::max(smooth_rim_mm, 1.5 * teeth) : smooth_rim_mm;
   std::vector<Finding> named;
   std::optional<std::size_t> shape;  // of those, the farthest that is no matter of the rim
   for (const auto& d : *deviations) {
@@ -169,7 +170,7 @@ void Audit::check_edge_points() {
         "the plate has not four smooth sides that meet in four corners: {}; its outline cannot be told",
         named[*shape].text);
   add_named(std::move(named), "places");
-  if (is_torn) return;
+  if (is_torn_) return;
   for (Finding& corner : blunt_corners()) add(std::move(corner));
 }
 
@@ -399,8 +400,8 @@ void Audit::check_agreement() {
   const auto share = [&](int count) {
     return static_cast<double>(count) / static_cast<double>(shots_.size());
   };
-  // A rim that is torn puts edges aside too, but then those who look at the same place see the same.
-  const bool edges_contradict = apart_ > 1 && share(aside) > most_aside;
+  // A rim that is torn puts edges aside too.
+  const bool edges_contradict = !is_torn_ && apart_ > 1 && share(aside) > most_aside;
   if (share(in_height) > most_in_height || edges_contradict)
     add({.kind = FindingKind::shot_edges,
          .gravity = Gravity::untrusted,
