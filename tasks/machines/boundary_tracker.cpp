@@ -288,12 +288,13 @@ ShotPlace BoundaryTracker::seek_on(TrackAction action) {
 
 // Of the field at hand, the corner that lies farthest along x; a little inside.
 Vector3d BoundaryTracker::corner_of_field_along_x() const {
-  const auto motion = geometry::turned_about_z(place_.head_yaw, place_.centre);
+  const double c = std::cos(place_.head_yaw), s = std::sin(place_.head_yaw);
   Vector3d farthest = place_.centre;
-  for (const double x : {-1.0, 1.0}) {
-    for (const double y : {-1.0, 1.0}) {
-      const Vector3d corner = motion * Vector3d{x * (settings_.field_half_x_mm - hint_inside_mm),
-                                                y * (settings_.field_half_y_mm - hint_inside_mm / 2), 0};
+  for (const double way_x : {-1.0, 1.0}) {
+    for (const double way_y : {-1.0, 1.0}) {
+      const double x = way_x * (settings_.field_half_x_mm - hint_inside_mm),
+                   y = way_y * (settings_.field_half_y_mm - hint_inside_mm / 2);
+      const Vector3d corner = place_.centre + Vector3d{c * x - s * y, s * x + c * y, 0};
       if (corner.x() > farthest.x()) farthest = corner;
     }
   }
