@@ -54,6 +54,9 @@ class OutlineSearch {
   // ---- after not_four_sided: the corners between which the edge points lie on straight lines best,
   // counter-clockwise about their middle, and how much of the edge does (0 to 1).
   std::span<const Eigen::Vector2d> corners() const { return {corners_.data(), corner_count_}; }
+  std::span<const Eigen::Vector2d> candidates() const {
+    return candidates_;
+  }  // as they were given to begin()
   double share_along() const { return share_along_; }
   // Of the best four-sided outline, what is farthest off; nullptr when there is none.
   const OutlineDeviation* worst() const MOLDLOFT_GEOMETRY_NONBLOCKING;

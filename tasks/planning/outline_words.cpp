@@ -3,6 +3,7 @@
 #include "geometry/edges/outline_search.hpp"
 
 #include <algorithm>
+#include <optional>
 
 namespace moldloft::tasks {
 namespace {
@@ -86,11 +87,30 @@ hal::FixedText<80> places(std::span<const Eigen::Vector2d> corners) {
   return list;
 }
 
+// Sides as long as this are measured.
+constexpr double shortest_side_mm = 40;
+
+// Of four corners in a row round the plate.
+std::optional<hal::Message> short_side(std::span<const Eigen::Vector2d> corners) {
+  if (corners.size() != 4) return std::nullopt;
+  std::size_t at = 0;
+  const auto length = [&](std::size_t i) { return (corners[(i + 1) % 4] - corners[i]).norm(); };
+  for (std::size_t i = 1; i < 4; ++i) {
+    if (length(i) < length(at)) at = i;
+  }
+  if (length(at) >= shortest_side_mm) return std::nullopt;
+  return hal::Message::format(
+      "the plate is too small: its side at ({:.0f}, {:.0f}) is {:.0f} mm long, sides from {:g} mm on are "
+      "measured",
+      corners[at].x(), corners[at].y(), length(at), shortest_side_mm);
+}
+
 }  // namespace
 
 hal::Message words_of(const geometry::OutlineSearch& search) {
   constexpr std::string_view what_to_do = "only plates with four sides are measured";
   const auto corners = search.corners();
+  if (const auto small = short_side(search.candidates())) return *small;
   if (search.share_along() >= whole_share && corners.size() != 4)
     return hal::Message::format("the plate has {} corners, {}: {}", corners.size(), places(corners).view(),
                                 what_to_do);

@@ -1,8 +1,11 @@
 #include "tasks/planning/outline_words.hpp"
 
+#include "geometry/edges/outline_search.hpp"
+
 #include <doctest/doctest.h>
 
 #include <string>
+#include <vector>
 
 using namespace moldloft;
 using geometry::OutlineDeviation;
@@ -41,4 +44,19 @@ TEST_CASE("each way in which an edge leaves its outline has words with the place
         "40 mm of the edge at (120, 300) were not seen");
   CHECK(words({.kind = Kind::apart, .place = {200, 40}, .inwards_mm = 50}) ==
         "an edge 50 mm inside the outline at (200, 40), beside the one that was seen there");
+}
+
+TEST_CASE("a plate with a side that is too short is said to be too small, not to have another shape") {
+  const std::vector<Eigen::Vector2d> corners{{400, 0}, {580, 4}, {578, 44}, {401, 29}};
+  std::vector<Eigen::Vector2d> edge;
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (double t = 0; t < 1; t += 0.02) edge.push_back((1 - t) * corners[i] + t * corners[(i + 1) % 4]);
+  }
+  geometry::OutlineSearch search{edge.size(), {}, {}, {}};
+  search.begin(edge, corners);
+  CHECK(tasks::words_of(search).view() ==
+        "the plate is too small: its side at (401, 29) is 29 mm long, sides from 40 mm on are measured");
+  const std::vector<Eigen::Vector2d> long_enough{{400, 0}, {580, 4}, {578, 44}, {401, 41}};
+  search.begin(edge, long_enough);
+  CHECK(tasks::words_of(search).view().find("too small") == std::string_view::npos);
 }
