@@ -108,7 +108,7 @@ std::size_t OutlineBuilder::bytes() const {
 std::expected<void, Error> OutlineBuilder::begin(std::span<const Eigen::Vector2d> points,
                                                  std::span<const Eigen::Vector2d> corner_hints,
                                                  std::span<const std::uint8_t> left_out) {
-  phase_ = Phase::idle;
+  stage_ = Stage::idle;
   if (corner_hints.size() != 4) return std::unexpected(Error::not_four_sided);
   if (points.size() > side_of_.capacity()) return std::unexpected(Error::capacity);
   if (points.size() < 4 * fewest_points) return std::unexpected(Error::too_few_points);
@@ -131,7 +131,7 @@ std::expected<void, Error> OutlineBuilder::begin(std::span<const Eigen::Vector2d
   left_out_ = left_out;
   side_of_.assign(points.size(), no_side);
   residual_.assign(points.size(), 0.0);
-  phase_ = Phase::assign;
+  stage_ = Stage::assign;
   round_ = 0, next_point_ = 0;
   *side_pass_ = {};
   return {};
@@ -139,37 +139,37 @@ std::expected<void, Error> OutlineBuilder::begin(std::span<const Eigen::Vector2d
 
 std::expected<bool, Error> OutlineBuilder::step() {
   const auto fail = [&](Error error) {
-    phase_ = Phase::idle;
+    stage_ = Stage::idle;
     return std::unexpected(error);
   };
-  switch (phase_) {
-    case Phase::idle:
+  switch (stage_) {
+    case Stage::idle:
       return std::unexpected(Error::too_few_points);
-    case Phase::done:
+    case Stage::done:
       return true;
-    case Phase::assign:
+    case Stage::assign:
       assign_chunk();
-      if (next_point_ == points_.size()) phase_ = Phase::sort;
+      if (next_point_ == points_.size()) stage_ = Stage::sort;
       return false;
-    case Phase::sort:
+    case Stage::sort:
       if (const auto sorted = sort_by_side(); !sorted) return fail(sorted.error());
       side_ = 0, pass_ = 0;
-      phase_ = Phase::fit;
+      stage_ = Stage::fit;
       return false;
-    case Phase::fit: {
+    case Stage::fit: {
       const auto side_done = fit_pass();
       if (!side_done) return fail(side_done.error());
-      if (*side_done && ++side_ == 4) phase_ = Phase::corners;
+      if (*side_done && ++side_ == 4) stage_ = Stage::corners;
       return false;
     }
-    case Phase::corners:
+    case Stage::corners:
       if (const auto met = meet_corners(); !met) return fail(met.error());
       next_point_ = 0;
-      phase_ = ++round_ < rounds ? Phase::assign : Phase::finish;
+      stage_ = ++round_ < rounds ? Stage::assign : Stage::finish;
       return false;
-    case Phase::finish:
+    case Stage::finish:
       finish();
-      phase_ = Phase::done;
+      stage_ = Stage::done;
       return true;
   }
   return std::unexpected(Error::too_few_points);

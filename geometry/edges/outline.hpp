@@ -61,7 +61,7 @@ class OutlineBuilder {
  private:
   struct Side;
   struct SidePass;
-  enum class Phase : std::uint8_t { idle, assign, sort, fit, corners, finish, done };
+  enum class Stage : std::uint8_t { idle, assign, sort, fit, corners, finish, done };
 
   void assign_chunk();
   std::expected<void, Error> sort_by_side();
@@ -83,7 +83,7 @@ class OutlineBuilder {
   std::vector<double> residual_, scratch_;
   std::vector<Side> sides_;  // four
   std::unique_ptr<SidePass> side_pass_;
-  Phase phase_ = Phase::idle;
+  Stage stage_ = Stage::idle;
   std::size_t next_point_ = 0;
   int round_ = 0, side_ = 0, pass_ = 0;
 };

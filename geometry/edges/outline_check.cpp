@@ -103,7 +103,7 @@ struct OutlineCheck::Run {
   double inwards = 0, outwards = 0;
   Vector2d reference = Vector2d::Zero();
   int corner = -1;
-  Moments moments;
+  Moments moments{};
 };
 
 OutlineCheck::OutlineCheck(std::size_t max_points) {

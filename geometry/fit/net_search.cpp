@@ -95,7 +95,7 @@ void NetSearch::shrink_to(int spans_u, int spans_v) {
     if (c.merged) c.merged->reshape(u, v);
     if (u == fewest_spans && v == fewest_spans) break;
   }
-  chosen_ = first_ = 0, phase_ = Phase::done;
+  chosen_ = first_ = 0, stage_ = Stage::done;
 }
 
 std::size_t NetSearch::bytes() const {
@@ -119,22 +119,22 @@ std::expected<void, Flaw> NetSearch::start(const MomentGrid& points, const NetTa
     first_ = 0;
     return fail(Error::too_few_points, model.totals.points);
   }
-  search_in(1, count_, Phase::merge);
+  search_in(1, count_, Stage::merge);
   return {};
 }
 
-void NetSearch::search_in(std::size_t first, std::size_t end, Phase phase) {
-  at_ = first, end_ = end, phase_ = phase;
+void NetSearch::search_in(std::size_t first, std::size_t end, Stage stage) {
+  at_ = first, end_ = end, stage_ = stage;
   cell_ = shot_ = 0, shot_cell_ = 0;
 }
 
 std::unexpected<Flaw> NetSearch::fail(Error error, std::size_t where) {
-  flaw_ = {error, where}, phase_ = Phase::failed;
+  flaw_ = {error, where}, stage_ = Stage::failed;
   return std::unexpected(flaw_);
 }
 
 void NetSearch::also_try(SplineNet net, std::span<const int> at_u, std::span<const int> at_v) {
-  assert(phase_ == Phase::done && model_.boundary.empty() && !settings_.shrinks);
+  assert(stage_ == Stage::done && model_.boundary.empty() && !settings_.shrinks);
   MomentGrid merged(net.cells_u(), net.cells_v());
   merged.merge_blocks(*points_, at_u, at_v);
   // It may have more unknowns than the nested nets that the points determine.
@@ -148,12 +148,12 @@ void NetSearch::also_try(SplineNet net, std::span<const int> at_u, std::span<con
   candidates_.insert(candidates_.begin() + offset, {.net = std::move(net), .merged = std::move(merged)});
   scores_.insert(scores_.begin() + offset, NetScore{});
   ++count_;
-  search_in(place, place + 1, Phase::start);
+  search_in(place, place + 1, Stage::start);
 }
 
 void NetSearch::solve_again() {
-  assert(phase_ == Phase::done);
-  search_in(chosen_, chosen_ + 1, Phase::start);
+  assert(stage_ == Stage::done);
+  search_in(chosen_, chosen_ + 1, Stage::start);
 }
 
 // The cells of all nets, each one's from those of the next finer one; true when all are merged. Alternating with the
@@ -213,7 +213,7 @@ void NetSearch::take_score() {
 }
 
 std::expected<bool, Flaw> NetSearch::step(double budget, double spent) {
-  // Small nets and short phases share a step. Half of a step leaves room for the largest piece that cannot be divided.
+  // Small nets and short stages share a step. Half of a step leaves room for the largest piece that cannot be divided.
   work_ = spent, full_ = false;
   while (true) {
     const auto ready = piece(budget);
@@ -222,21 +222,21 @@ std::expected<bool, Flaw> NetSearch::step(double budget, double spent) {
 }
 
 std::expected<bool, Flaw> NetSearch::piece(double budget) {
-  switch (phase_) {
-    case Phase::merge:
+  switch (stage_) {
+    case Stage::merge:
       full_ = !merge_some(budget);
       if (full_) return false;
-      at_ = 0, phase_ = Phase::merge_shots;
+      at_ = 0, stage_ = Stage::merge_shots;
       [[fallthrough]];
-    case Phase::merge_shots:
+    case Stage::merge_shots:
       full_ = !merge_shots(budget);
       if (full_) return false;
       if (at_ < first_) return ++at_, false;
       [[fallthrough]];
-    case Phase::start:
-      phase_ = Phase::solve;
+    case Stage::start:
+      stage_ = Stage::solve;
       return start_net();
-    case Phase::solve: {
+    case Stage::solve: {
       const auto solved = solver_.step(budget - work_);
       work_ += solver_.work();
       full_ = solver_.full();
@@ -247,18 +247,18 @@ std::expected<bool, Flaw> NetSearch::piece(double budget) {
                                                              : solver_.factor().smallest_column()));
         return fail(solved.error(), static_cast<std::size_t>(i) * net.control_v() + j);
       }
-      if (*solved) phase_ = Phase::score;
+      if (*solved) stage_ = Stage::score;
       return false;
     }
-    case Phase::score:
+    case Stage::score:
       take_score();
-      if (++at_ < end_) return phase_ = Phase::merge_shots, false;
+      if (++at_ < end_) return stage_ = Stage::merge_shots, false;
       chosen_ = first_ + choose_net(scores(), settings_.criterion, settings_.tolerance);
-      phase_ = Phase::done;
+      stage_ = Stage::done;
       return true;
-    case Phase::done:
+    case Stage::done:
       return true;
-    case Phase::failed:
+    case Stage::failed:
       break;
   }
   return std::unexpected(flaw_);
@@ -274,16 +274,16 @@ std::expected<void, Flaw> NetSearch::finish() {
 
 // A net costs unknowns^2, near enough: sixteen times the next one.
 double NetSearch::progress() const {
-  if (phase_ == Phase::done) return 1;
-  if (phase_ == Phase::failed || phase_ == Phase::merge) return 0;
+  if (stage_ == Stage::done) return 1;
+  if (stage_ == Stage::failed || stage_ == Stage::merge) return 0;
   double all = 0, done = 0;
   for (std::size_t k = 0; k < count_; ++k) {
     const double unknowns = candidates_[k].net.unknowns(), cost = unknowns * unknowns;
     all += cost;
     if (k < at_) done += cost;
     if (k != at_) continue;
-    if (phase_ == Phase::solve) done += cost * solver_.progress();
-    if (phase_ == Phase::score) done += cost;
+    if (stage_ == Stage::solve) done += cost * solver_.progress();
+    if (stage_ == Stage::score) done += cost;
   }
   return std::min(done / all, 0.999);
 }

@@ -81,13 +81,13 @@ class NetSearch {
   std::size_t bytes() const;
 
  private:
-  enum class Phase { merge, merge_shots, start, solve, score, done, failed };
+  enum class Stage { merge, merge_shots, start, solve, score, done, failed };
 
   static std::vector<NetCandidate> candidates_of(SplineNet finest, bool nested);
   static NetSolver solver_for(std::span<const NetCandidate>, const NetSearchSettings&, double points);
   static bool determined(const NetCandidate&, const NetSearchSettings&, double points);
   const MomentGrid& grid(const NetCandidate& c) const { return c.merged ? *c.merged : *points_; }
-  void search_in(std::size_t first, std::size_t end, Phase);
+  void search_in(std::size_t first, std::size_t end, Stage);
   std::expected<bool, Flaw> piece(double budget);
   std::unexpected<Flaw> fail(Error, std::size_t where);
   bool merge_some(double budget);
@@ -104,7 +104,7 @@ class NetSearch {
   const MomentGrid* points_ = nullptr;
   ShotOffsets* shots_ = nullptr;
   NetTask model_;
-  Phase phase_ = Phase::done;
+  Stage stage_ = Stage::done;
   Flaw flaw_{};
   std::size_t first_ = 0, chosen_ = 0;  // first_: the finest that the points determine
   std::size_t at_ = 0, end_ = 0;        // the candidate at hand, and past the last to be solved

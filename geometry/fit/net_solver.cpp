@@ -50,13 +50,13 @@ void NetSolver::start(const NetTask& task, ShotOffsets* shots) {
   result_ = {};
   result_.point_sigma_mm = task.point_sigma_mm;
   if (!holds(*task.net)) {
-    phase_ = Phase::net_too_large;
+    stage_ = Stage::net_too_large;
     return;
   }
   matrix_.reset(size(), task.net->half_band());
   trace_data_ = objective_ = border_squares_ = norm_one_ = 0;
   cursor_ = column_ = row_ = 0, shot_cell_ = 0;
-  phase_ = Phase::clear;
+  stage_ = Stage::clear;
 }
 
 template <typename Piece>
@@ -219,31 +219,31 @@ bool NetSolver::step_shots() {
   const int n = size();
   const double band = task_.net->half_band();
   ShotOffsets& shots = *shots_;
-  switch (phase_) {
-    case Phase::touch:
+  switch (stage_) {
+    case Stage::touch:
       if (each_shot(touch_cost, [&](int slot, std::size_t first, std::size_t end) {
             shots.touch(slot, *task_.net, first, end);
           })) {
         shots.start(*task_.net);
-        phase_ = Phase::columns;
+        stage_ = Stage::columns;
       }
       return true;
-    case Phase::columns:
+    case Stage::columns:
       if (advance(n, shots.row_length(), [&](int a, int b) {
             shots.clear_rows(a, b);
             for (; a < b; ++a) shots.set_y(a, right_[a]);
           })) {
-        phase_ = Phase::scatter;
+        stage_ = Stage::scatter;
       }
       return true;
-    case Phase::scatter:
+    case Stage::scatter:
       if (each_shot(load_cost, [&](int slot, std::size_t first, std::size_t end) {
             shots.scatter(slot, *task_.net, first, end);
           })) {
-        phase_ = Phase::lower, column_ = 0, cursor_ = shots.first_row(0);
+        stage_ = Stage::lower, column_ = 0, cursor_ = shots.first_row(0);
       }
       return true;
-    case Phase::lower:
+    case Stage::lower:
       if (advance(
               n, 8 * band,
               [&](int a, int b) {
@@ -251,29 +251,29 @@ bool NetSolver::step_shots() {
               },
               band_panel)) {
         if (++column_ == shots.groups()) {
-          phase_ = Phase::form, column_ = row_ = 0;
+          stage_ = Stage::form, column_ = row_ = 0;
         }
         cursor_ = shots.first_row(column_ % shots.groups());
       }
       return true;
-    case Phase::form:
+    case Stage::form:
       if (advance(n, 64, [&](int a, int b) { shots.form(matrix_.kernel(), row_, column_, a, b); })) {
         if (++column_ > row_) ++row_, column_ = 0;
         if (row_ < shots.groups()) {
           cursor_ = shots.first_row(row_);
         } else {
           estimate_noise(shots.y_squared());
-          phase_ = Phase::schur, column_ = 0;
+          stage_ = Stage::schur, column_ = 0;
         }
       }
       return true;
-    case Phase::schur:
+    case Stage::schur:
       if (!shots.factor_row(column_, rho_)) return false;
       work_ += 0.6 * column_ * column_ + 60 * column_;
       if (++column_ == shots.count()) {
         take_offsets();
         work_ += 2.4 * column_ * column_;
-        phase_ = Phase::offsets, column_ = 0;
+        stage_ = Stage::offsets, column_ = 0;
       }
       return true;
     default:
@@ -286,7 +286,7 @@ bool NetSolver::step_shots() {
             }
             objective_ -= before_after;
           })) {
-        phase_ = Phase::backward;
+        stage_ = Stage::backward;
       }
       return true;
   }
@@ -317,7 +317,7 @@ bool NetSolver::step_corners() {
 
 std::expected<bool, Error> NetSolver::step(double budget) {
   work_ = 0, budget_ = budget, full_ = false;
-  // The phases of a small net are far shorter than a step: it takes as many as fit.
+  // The stages of a small net are far shorter than a step: it takes as many as fit.
   while (true) {
     const auto ready = piece();
     if (!ready || *ready || full_ || work_ >= budget_) return ready;
@@ -328,47 +328,47 @@ std::expected<bool, Error> NetSolver::piece() {
   const SplineNet& net = *task_.net;
   const int n = size(), rows = task_.moments->cells_u(), cells = task_.moments->cells_v();
   const double band = net.half_band();
-  switch (phase_) {
-    case Phase::clear:
+  switch (stage_) {
+    case Stage::clear:
       if (advance(n, band + 3, [&](int a, int b) {
             matrix_.clear(a, b);
             std::fill(right_.begin() + a, right_.begin() + b, 0.0);
             std::fill(data_diagonal_.begin() + a, data_diagonal_.begin() + b, 0.0);
             std::fill(column_sums_.begin() + a, column_sums_.begin() + b, 0.0);
           })) {
-        phase_ = Phase::data;
+        stage_ = Stage::data;
       }
       return false;
-    case Phase::data:
+    case Stage::data:
       if (advance(task_.moments->cell_count(), gram_cost, [&](int a, int b) { add_data(a, b); })) {
         const double ratio = trace_data_ / net.fairing_trace(task_.length_u_mm, task_.length_v_mm);
         fairing_ = task_.fairing * ratio, sparse_fairing_ = task_.sparse_fairing * ratio;
-        phase_ = Phase::fair;
+        stage_ = Stage::fair;
       }
       return false;
-    case Phase::fair:
+    case Stage::fair:
       if (fairing_ <= 0 ||
           advance(net.slow_rows(), unknown_fairing_cost * n / net.slow_rows(), [&](int a, int b) {
             net.add_fairing(matrix_, a, b, task_.length_u_mm, task_.length_v_mm, fairing_);
           })) {
-        phase_ = Phase::border;
+        stage_ = Stage::border;
       }
       return false;
-    case Phase::border:
+    case Stage::border:
       if (sparse_fairing_ <= 0 || advance(rows, fairing_cost * cells, [&](int a, int b) {
             for (; a < b; ++a) add_sparse_fairing_row(a);
           })) {
         if (!task_.boundary.empty()) add_border(), work_ += 2 * band * 4 * std::sqrt(n);
-        phase_ = norm_wanted_ ? Phase::norm : Phase::factor;
+        stage_ = norm_wanted_ ? Stage::norm : Stage::factor;
       }
       return false;
-    case Phase::norm:
+    case Stage::norm:
       if (advance(n, 2 * band, [&](int a, int b) { take_norm(a, b); })) {
         norm_one_ = *std::max_element(column_sums_.begin(), column_sums_.begin() + n);
-        phase_ = Phase::factor;
+        stage_ = Stage::factor;
       }
       return false;
-    case Phase::factor: {
+    case Stage::factor: {
       bool positive = true;
       const double column_cost = 0.5 * band * (band + 8);
       // Narrower panels give the same numbers, only less quickly.
@@ -381,53 +381,53 @@ std::expected<bool, Error> NetSolver::piece() {
       result_.smallest_pivot = matrix_.smallest_pivot() / matrix_.largest_pivot();
       result_.smallest_pivot_unknown = matrix_.smallest_column();
       if (!(result_.smallest_pivot > pivot_floor)) return std::unexpected(Error::singular);
-      phase_ = shots_ ? Phase::touch : Phase::forward;
+      stage_ = shots_ ? Stage::touch : Stage::forward;
       return false;
     }
-    case Phase::forward:
+    case Stage::forward:
       if (advance(n, band, [&](int a, int b) { matrix_.solve_lower(right_, a, b); })) {
         estimate_noise(ConstVector(right_.data(), n).squaredNorm());
-        phase_ = Phase::backward;
+        stage_ = Stage::backward;
       }
       return false;
-    case Phase::touch:
-    case Phase::columns:
-    case Phase::scatter:
-    case Phase::lower:
-    case Phase::form:
-    case Phase::schur:
-    case Phase::offsets:
+    case Stage::touch:
+    case Stage::columns:
+    case Stage::scatter:
+    case Stage::lower:
+    case Stage::form:
+    case Stage::schur:
+    case Stage::offsets:
       if (!step_shots()) return std::unexpected(Error::singular);
       return false;
-    case Phase::backward:
+    case Stage::backward:
       if (advance(n, band, [&](int a, int b) { matrix_.solve_upper(right_, n - b, n - a); }))
-        phase_ = task_.boundary.empty() ? Phase::corners : Phase::energy;
+        stage_ = task_.boundary.empty() ? Stage::corners : Stage::energy;
       return false;
-    case Phase::corners:
-      if (step_corners()) phase_ = Phase::energy, cursor_ = 0;
+    case Stage::corners:
+      if (step_corners()) stage_ = Stage::energy, cursor_ = 0;
       return false;
-    case Phase::energy:
+    case Stage::energy:
       if (fairing_ <= 0 ||
           advance(net.slow_rows(), unknown_fairing_cost * n / net.slow_rows(), [&](int a, int b) {
             objective_ -=
                 fairing_ * net.fairing_energy(coefficients(), a, b, task_.length_u_mm, task_.length_v_mm);
           })) {
-        phase_ = Phase::sparse_energy;
+        stage_ = Stage::sparse_energy;
       }
       return false;
-    case Phase::sparse_energy:
+    case Stage::sparse_energy:
       if (sparse_fairing_ <= 0 || advance(rows, fairing_cost * cells, [&](int a, int b) {
             for (; a < b; ++a) subtract_sparse_energy(a);
           })) {
         finish();
         if (!std::isfinite(result_.squares)) return std::unexpected(Error::too_large);
-        phase_ = Phase::done;
+        stage_ = Stage::done;
         return true;
       }
       return false;
-    case Phase::done:
+    case Stage::done:
       return true;
-    case Phase::net_too_large:
+    case Stage::net_too_large:
       return std::unexpected(Error::capacity);
   }
   return true;
@@ -441,6 +441,6 @@ std::expected<void, Error> NetSolver::solve() {
   }
 }
 
-double NetSolver::progress() const { return static_cast<double>(phase_) / static_cast<double>(Phase::done); }
+double NetSolver::progress() const { return static_cast<double>(stage_) / static_cast<double>(Stage::done); }
 
 }  // namespace moldloft::geometry

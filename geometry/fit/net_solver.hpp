@@ -84,7 +84,7 @@ class NetSolver {
   std::size_t bytes() const;
 
  private:
-  enum class Phase {
+  enum class Stage {
     clear,
     data,
     fair,
@@ -108,7 +108,7 @@ class NetSolver {
   };
 
   int size() const { return task_.net->unknowns(); }
-  std::expected<bool, Error> piece();  // as much of one phase as the step has room for
+  std::expected<bool, Error> piece();  // as much of one stage as the step has room for
   // Advances the cursor by one slice; true when it has reached `end`, and then it starts again from 0.
   template <typename Piece>
   bool advance(int end, double cost_of_one, Piece&& piece, int grain = 1);
@@ -133,7 +133,7 @@ class NetSolver {
   NetResult result_;
   BandCholesky matrix_;
   std::vector<double> right_, data_diagonal_, column_sums_, corner_;
-  Phase phase_ = Phase::done;
+  Stage stage_ = Stage::done;
   int cursor_ = 0, column_ = 0, row_ = 0;
   std::size_t shot_cell_ = 0;
   bool norm_wanted_ = false;

@@ -73,7 +73,7 @@ std::size_t shot_cells_planned(const SurfaceFitSettings& settings) {
 }  // namespace
 
 struct SurfaceFit::Work {
-  enum class Phase { adding, total, search, done, failed };
+  enum class Stage { adding, total, search, done, failed };
 
   explicit Work(const SurfaceFitSettings& s)
       : settings(s),
@@ -89,7 +89,7 @@ struct SurfaceFit::Work {
   std::expected<void, Flaw> start_search();
   void finish();
   std::unexpected<Error> fail(const Flaw& flaw) {
-    error = flaw.error, phase = Phase::failed;
+    error = flaw.error, stage = Stage::failed;
     return std::unexpected(error);
   }
 
@@ -105,7 +105,7 @@ struct SurfaceFit::Work {
   SurfaceFitReport report;
   Eigen::Vector2d last_uv{0.5, 0.5};
   double datum = 0;  // heights are summed relative to the first point's, so that squares keep their digits
-  Phase phase = Phase::adding;
+  Stage stage = Stage::adding;
   Error error = Error::too_few_points;
   int cell = 0;  // that clearing or adding up is at
   double work = 0;
@@ -151,22 +151,22 @@ void SurfaceFit::begin_clearing(const PlanMap& map) {
   work_->report = {};
   work_->last_uv = {0.5, 0.5};
   work_->block.count = 0, work_->block.shot_rows_wanted = work_->settings.shot_sigma_mm > 0;
-  work_->phase = Work::Phase::adding;
+  work_->stage = Work::Stage::adding;
 }
 
 void SurfaceFit::Work::choose_finest() {
   const auto [least, most] = std::minmax(settings.max_spans_u, settings.max_spans_v);
-  int u = settings.max_spans_u, v = settings.max_spans_v;
+  int spans_u = settings.max_spans_u, spans_v = settings.max_spans_v;
   if (settings.finest_span_mm > 0) {
     const Eigen::Vector2d corners[] = {map->at(0, 0).value, map->at(1, 0).value, map->at(1, 1).value,
                                        map->at(0, 1).value};
     const auto side = [&](int i) { return (corners[(i + 1) % 4] - corners[i]).norm(); };
     const double length_u = std::max(side(0), side(2)), length_v = std::max(side(1), side(3));
-    u = spans_over(length_u, settings.finest_span_mm, length_u < length_v ? least : most);
-    v = spans_over(length_v, settings.finest_span_mm, length_u < length_v ? most : least);
+    spans_u = spans_over(length_u, settings.finest_span_mm, length_u < length_v ? least : most);
+    spans_v = spans_over(length_v, settings.finest_span_mm, length_u < length_v ? most : least);
   }
-  finest.reshape(u, v);
-  search.shrink_to(u, v);
+  finest.reshape(spans_u, spans_v);
+  search.shrink_to(spans_u, spans_v);
 }
 
 // The block's heights and weights, and u and v, are there.
@@ -218,7 +218,7 @@ void SurfaceFit::start_solving() {
   work_->totals.weight = work_->totals.squares = 0;
   work_->report.points_used = work_->totals.points;
   work_->cell = 0;
-  work_->phase = Work::Phase::total;
+  work_->stage = Work::Stage::total;
 }
 
 // What all cells hold together; true when the last is in.
@@ -264,35 +264,35 @@ void SurfaceFit::Work::finish() {
 std::expected<bool, Error> SurfaceFit::step() {
   Work& w = *work_;
   w.work = 0;
-  switch (w.phase) {
-    case Work::Phase::adding:
+  switch (w.stage) {
+    case Work::Stage::adding:
       return std::unexpected(Error::too_few_points);
-    case Work::Phase::total:
+    case Work::Stage::total:
       if (!w.total_some()) return false;
       if (const auto started = w.start_search(); !started) return w.fail(started.error());
-      w.phase = Work::Phase::search;
+      w.stage = Work::Stage::search;
       if (w.work >= NetSolver::work_a_step / 2) return false;
       [[fallthrough]];
-    case Work::Phase::search: {
+    case Work::Stage::search: {
       const auto found = w.search.step(NetSolver::work_a_step, w.work);
       w.work = w.search.work();
       if (!found) return w.fail(found.error());
       if (!*found) return false;
       w.finish();
-      w.phase = Work::Phase::done;
+      w.stage = Work::Stage::done;
       return true;
     }
-    case Work::Phase::done:
+    case Work::Stage::done:
       return true;
-    case Work::Phase::failed:
+    case Work::Stage::failed:
       break;
   }
   return std::unexpected(w.error);
 }
 
 double SurfaceFit::progress() const {
-  if (work_->phase == Work::Phase::done) return 1;
-  return work_->phase == Work::Phase::search ? work_->search.progress() : 0;
+  if (work_->stage == Work::Stage::done) return 1;
+  return work_->stage == Work::Stage::search ? work_->search.progress() : 0;
 }
 
 double SurfaceFit::work() const { return work_->work; }

@@ -44,7 +44,7 @@ struct ScannerEvent {
 };
 
 struct ScannerInfo {
-  FixedText<16> sensor;
+  FixedText<16> sensor{};
   std::uint32_t session_id = 0;
   std::uint32_t max_stripes = 0, max_points = 0;  // a frame's largest size
   double field_x_mm = 0, field_y_mm = 0;          // field of view at z = 0

@@ -20,8 +20,8 @@ struct HardRow {
   std::uint64_t seed = 0;
   std::string cause, what;
   int exit_code = 1;
-  std::string said;                // the message and every finding
-  std::vector<std::string> words;  // the same, one by one
+  std::string said{};                // the message and every finding
+  std::vector<std::string> words{};  // the same, one by one
   firmware_like::Json truth = firmware_like::Json::object();
   bool measured() const { return exit_code == 0; }
   bool warned() const;  // measured, with warnings

@@ -277,7 +277,7 @@ void Measurement::keep_evidence(const geometry::RigidMotion& world_from_scanner,
                  .place = looked_at_.place,
                  .world_from_scanner = world_from_scanner,
                  .plate_found = plate_found},
-                view_, tracker_.edge_points().size());
+                view_);
 }
 
 // Adds the shot's heights to the rough model and gives their mean. Gives nothing when the scanner saw the table alone.

@@ -87,7 +87,7 @@ void EvidenceBook::add_samples(const geometry::RigidMotion& world_from_scanner, 
     hal::add_within_reserve(kept_.samples, world_from_scanner * points[i]);
 }
 
-void EvidenceBook::add(const ShotSeen& shot, ShotView& view, std::size_t edge_points) {
+void EvidenceBook::add(const ShotSeen& shot, ShotView& view) {
   if (kept_.shots.size() == kept_.shots.capacity()) return;
   if (shot.plate_found) {
     add_runs(shot.world_from_scanner, view);
@@ -96,7 +96,6 @@ void EvidenceBook::add(const ShotSeen& shot, ShotView& view, std::size_t edge_po
   ShotSeen kept = shot;
   kept.runs_end = static_cast<std::uint32_t>(kept_.runs.size());
   kept.samples_end = static_cast<std::uint32_t>(kept_.samples.size());
-  kept.edges_end = static_cast<std::uint32_t>(edge_points);
   hal::add_within_reserve(kept_.shots, kept);
 }
 

@@ -43,8 +43,7 @@ struct ShotSeen {
   ShotPlace place;
   geometry::RigidMotion world_from_scanner = geometry::RigidMotion::Identity();
   bool plate_found = false;
-  // One past the shot's own in the lists below, and in the tracker's edge points.
-  std::uint32_t runs_end = 0, samples_end = 0, edges_end = 0;
+  std::uint32_t runs_end = 0, samples_end = 0;  // one past the shot's own in the lists below
 };
 
 struct RunEvidence {
@@ -64,8 +63,8 @@ class EvidenceBook {
   explicit EvidenceBook(const Settings&);
 
   void begin() MOLDLOFT_NONBLOCKING;
-  // The shot that `view` has looked at; its walk over points is used up. `edge_points`: how many the tracker has now.
-  void add(const ShotSeen& shot, ShotView& view, std::size_t edge_points) MOLDLOFT_NONBLOCKING;
+  // The shot that `view` has looked at; its walk over points is used up.
+  void add(const ShotSeen& shot, ShotView& view) MOLDLOFT_NONBLOCKING;
 
   // The known point of the plate that is nearest to the centre of a field and lies in it.
   std::optional<Eigen::Vector3d> known_near(const ShotPlace&, double field_half_x_mm,

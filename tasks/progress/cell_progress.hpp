@@ -43,7 +43,7 @@ struct CellProgress {
   hal::Duration time_left{-1};   // negative: not known yet
   bool left_is_planned = false;  // false: an estimate of how large the plate is, too
   Awaited awaited = Awaited::nothing;
-  hal::Message why;
+  hal::Message why{};
   hal::Message awaited_why{};  // what the device that is waited for has last come to; may be empty
   hal::Message robot_why{};    // the same of the robot where both are waited for
 };

@@ -94,18 +94,18 @@ bool ShotView::step() {
   return true;
 }
 
-std::size_t ShotView::next_kind() const {
+ShotView::PieceKind ShotView::next_kind() const {
   switch (stage_) {
     case Stage::cut:
-      if (points_here() < points_wanted()) return 1;
-      return finder_.walks() ? 2 : 3;
+      if (points_here() < points_wanted()) return PieceKind::unpack;
+      return finder_.walks() ? PieceKind::walk_stripes : PieceKind::cut_stripes;
     case Stage::find:
-      return finder_.describes() ? 5 : 4;
+      return finder_.describes() ? PieceKind::describe_plate : PieceKind::find_plate;
     case Stage::boundary:
     case Stage::done:
-      return 0;
+      break;
   }
-  return 0;
+  return PieceKind::other;
 }
 
 bool ShotView::end() {

@@ -39,8 +39,16 @@ class ShotView {
   void begin(const hal::Frame& frame, const Request&, hal::Scanner* unpacks = nullptr) MOLDLOFT_NONBLOCKING;
   bool step() MOLDLOFT_NONBLOCKING;
   bool waits() const MOLDLOFT_NONBLOCKING;  // step() can do nothing before more of the frame has arrived
-  // Of the pieces, those that cost alike (BackgroundTask::next_kind()); 0 for the others.
-  std::size_t next_kind() const MOLDLOFT_NONBLOCKING;
+  // Pieces of one kind cost alike (BackgroundTask::next_kind()); of the others only the quantum is certain.
+  enum class PieceKind : std::uint8_t {
+    other,
+    unpack,
+    walk_stripes,
+    cut_stripes,
+    find_plate,
+    describe_plate
+  };
+  PieceKind next_kind() const MOLDLOFT_NONBLOCKING;
   bool found() const { return !runs_.empty(); }
   const hal::Frame& frame() const { return *frame_; }  // that was begun last
 

@@ -28,6 +28,7 @@
 #include <expected>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace moldloft::geometry {
@@ -86,7 +87,9 @@ class SurfaceTask final : public BackgroundTask {
 
   bool has_work() const override;
   void step(Instant deadline) override;
-  std::size_t next_kind() const override { return can_look() ? looking_at_->next_kind() : 0; }
+  std::size_t next_kind() const override {
+    return can_look() ? std::to_underlying(looking_at_->next_kind()) : 0;
+  }
 
   Stage stage() const { return stage_; }
   // The outline is there, but the surface takes no shot yet. A shot exposed now might come too early.

@@ -115,8 +115,7 @@ inline void MadeUpRun::take(RunResult& r, hal::ShotPurpose purpose, const tasks:
                               .world_from_scanner = world_from_scanner,
                               .plate_found = r.evidence.runs.size() > first_run,
                               .runs_end = static_cast<std::uint32_t>(r.evidence.runs.size()),
-                              .samples_end = static_cast<std::uint32_t>(r.evidence.samples.size()),
-                              .edges_end = static_cast<std::uint32_t>(r.track.edge_points.size())});
+                              .samples_end = static_cast<std::uint32_t>(r.evidence.samples.size())});
 }
 
 inline RunResult MadeUpRun::result() {

@@ -129,19 +129,19 @@ TEST_CASE("a scanner whose lengths are wrong is told from a mount, with how wron
       const auto& motion = r.evidence.shots[shot].world_from_scanner;
       return Eigen::Vector3d{motion * (scale * (motion.inverse() * p))};
     };
-    std::uint32_t run_at = 0, sample_at = 0, edge_at = 0;
+    std::uint32_t run_at = 0, sample_at = 0;
+    r.track.edge_points.clear();
     for (std::size_t i = 0; i < r.evidence.shots.size(); ++i) {
       const auto& shot = r.evidence.shots[i];
       for (; run_at < shot.runs_end; ++run_at) {
         auto& seen = r.evidence.runs[run_at];
         seen.first = stretched(i, seen.first), seen.last = stretched(i, seen.last);
+        if (shot.purpose != hal::ShotPurpose::boundary) continue;
+        if (seen.at_first == tasks::RunEdge::edge) r.track.edge_points.push_back(seen.first.head<2>());
+        if (seen.at_last == tasks::RunEdge::edge) r.track.edge_points.push_back(seen.last.head<2>());
       }
       for (; sample_at < shot.samples_end; ++sample_at)
         r.evidence.samples[sample_at] = stretched(i, r.evidence.samples[sample_at]);
-      for (; edge_at < shot.edges_end; ++edge_at) {
-        const auto& p = r.track.edge_points[edge_at];
-        r.track.edge_points[edge_at] = stretched(i, {p.x(), p.y(), 20}).head<2>();
-      }
     }
     take_audit(r);
     INFO(texts(r.findings));

@@ -26,7 +26,7 @@ RunEvidence kept_of(std::uint32_t stripes, std::uint32_t points) {
   REQUIRE(view.found());
   EvidenceBook book{{.max_shots = 2}};
   book.begin();
-  book.add({.number = 1, .place = place, .world_from_scanner = motion, .plate_found = true}, view, 0);
+  book.add({.number = 1, .place = place, .world_from_scanner = motion, .plate_found = true}, view);
   return book.evidence();
 }
 
@@ -82,7 +82,7 @@ TEST_CASE("a shot beyond those planned is not kept, and nothing is written where
     view.begin(frame, {.hint = {0, 0, -94}, .reach_mm = 18});
     while (!view.step()) {
     }
-    book.add({.number = shot, .world_from_scanner = motion, .plate_found = true}, view, 0);
+    book.add({.number = shot, .place = {}, .world_from_scanner = motion, .plate_found = true}, view);
   }
   CHECK(book.evidence().shots.size() == 2);
   CHECK(book.evidence().runs.size() <= 2 * 64);
