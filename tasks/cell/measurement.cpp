@@ -62,8 +62,10 @@ Measurement::Measurement(const CellSettings& settings, Supervisor& supervisor, S
       shots_{shots},
       tracker_{settings.tracker},
       view_{settings.max_stripes, settings.max_points, settings.view},
-      evidence_{{.max_shots =
-                     static_cast<std::size_t>(settings.tracker.max_shots) + 1 + settings.max_surface_shots}},
+      evidence_{
+          {.max_shots = static_cast<std::size_t>(settings.tracker.max_shots) + 1 + settings.max_surface_shots,
+           .field_x_mm = settings.scan.field_x_mm,
+           .field_y_mm = settings.scan.field_y_mm}},
       surface_places_(settings.max_surface_shots),
       time_left_{settings.tracker, settings.scan} {
   boundary_places_.reserve(static_cast<std::size_t>(settings.tracker.max_shots) + 1);
@@ -248,7 +250,8 @@ void Measurement::hold_for_plate(HoldCause cause, const hal::Message& what) {
   if (!fault) {
     if (const auto band = blind_band(evidence_.evidence(), settings_.scan.field_y_mm))
       fault = hal::Message::format(
-          "from shot {} on the scanner shows no points in {:.0f} % of its field, all on one side: look at its "
+          "from shot {} on the scanner shows no points in {:.0f} % of its field, all on one side: look at "
+          "its "
           "window and shutter",
           evidence_.evidence().shots[band->shot].number, 100 * band->share(settings_.scan.field_y_mm));
   }

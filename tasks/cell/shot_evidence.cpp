@@ -33,7 +33,8 @@ std::span<const Eigen::Vector3d> RunEvidence::samples_of(std::size_t shot) const
   return part(samples, shot == 0 ? 0 : shots[shot - 1].samples_end, shots[shot].samples_end);
 }
 
-EvidenceBook::EvidenceBook(const Settings& settings) {
+EvidenceBook::EvidenceBook(const Settings& settings)
+    : field_reach_mm_{std::hypot(settings.field_x_mm, settings.field_y_mm) / 2} {
   kept_.shots.reserve(settings.max_shots);
   kept_.runs.reserve(settings.max_shots * runs_a_shot);
   kept_.samples.reserve(settings.max_shots * samples_a_shot);
@@ -104,8 +105,8 @@ std::optional<Eigen::Vector3d> EvidenceBook::known_near(const ShotPlace& place, 
   const Eigen::Vector2d centre = place.centre.head<2>();
   const Eigen::Vector2d along_x{std::cos(place.head_yaw), std::sin(place.head_yaw)};
   const Eigen::Vector2d along_y{-along_x.y(), along_x.x()};
-  // Fields farther apart than this have nothing in common.
-  const double reach = 2 * std::hypot(field_half_x_mm, field_half_y_mm);
+  // Shots farther away than this have seen nothing there.
+  const double reach = std::hypot(field_half_x_mm, field_half_y_mm) + field_reach_mm_;
   std::optional<Eigen::Vector3d> nearest;
   double least = std::hypot(field_half_x_mm, field_half_y_mm);
   const auto consider = [&](const Eigen::Vector3d& p) {

@@ -59,6 +59,7 @@ class EvidenceBook {
  public:
   struct Settings {
     std::size_t max_shots = 0;
+    double field_x_mm = 102, field_y_mm = 102;  // of the scanner
   };
   explicit EvidenceBook(const Settings&);
 
@@ -85,6 +86,7 @@ class EvidenceBook {
   void add_samples(const geometry::RigidMotion& world_from_scanner, ShotView&) MOLDLOFT_NONBLOCKING;
   static RunEdge edge_at(geometry::RunEnd) MOLDLOFT_NONBLOCKING;
 
+  double field_reach_mm_;  // from its centre to its corner
   RunEvidence kept_;
 };
 

@@ -87,3 +87,30 @@ TEST_CASE("a shot beyond those planned is not kept, and nothing is written where
   CHECK(book.evidence().shots.size() == 2);
   CHECK(book.evidence().runs.size() <= 2 * 64);
 }
+
+TEST_CASE("what a shot saw at the border of its field is known to whoever asks near there") {
+  const FlatWorld world{.outline = {{-300, -300}, {300, -300}, {300, 300}, {-300, 300}}};
+  hal::Frame frame{100, 50000};
+  const ShotPlace place{.centre = {40, -20, 100}, .head_yaw = 0.6};
+  const auto motion = geometry::turned_about_z(place.head_yaw, place.centre);
+  world.expose(motion, frame);
+  ShotView view{100, 50000, {}};
+  view.begin(frame, {.hint = {0, 0, -94}, .reach_mm = 18});
+  while (!view.step()) {
+  }
+  EvidenceBook book{{.max_shots = 2}};
+  book.begin();
+  book.add({.number = 1, .place = place, .world_from_scanner = motion, .plate_found = true}, view);
+  for (const double x : {-48.0, 0.0, 48.0}) {
+    for (const double y : {-48.0, 0.0, 48.0}) {
+      CAPTURE(x);
+      CAPTURE(y);
+      const Eigen::Vector3d asked = motion * Eigen::Vector3d{x, y, 0};
+      const auto known = book.known_near({.centre = asked}, 8, 8);
+      REQUIRE(known.has_value());
+      CHECK((known->head<2>() - asked.head<2>()).norm() < 8);
+      CHECK(known->z() == doctest::Approx(6));
+    }
+  }
+  CHECK_FALSE(book.known_near({.centre = motion * Eigen::Vector3d{70, 0, 0}}, 8, 8).has_value());
+}
