@@ -79,6 +79,8 @@ NetSearch::NetSearch(SplineNet finest, const NetSearchSettings& settings, double
   const SplineNet& net = candidates_.front().net;
   for (int spans = fewest_spans; spans <= std::max(net.cells_u(), net.cells_v()); spans *= 2)
     tables_.push_back(std::make_shared<const SpanTable>(uniform_clamped_knots(spans)));
+  // The candidates let go of the tables that they were made with: here, where memory may be freed.
+  shrink_to(net.cells_u(), net.cells_v());
 }
 
 // Each candidate is no larger than the one that its place was made for.

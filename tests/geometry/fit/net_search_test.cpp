@@ -1,6 +1,7 @@
 #include "geometry/fit/net_search.hpp"
 
 #include "geometry/fit/moment_accumulator.hpp"
+#include "geometry/heap_watch.hpp"
 
 #include <doctest/doctest.h>
 
@@ -120,6 +121,16 @@ TEST_CASE("cells without points are named where nothing fairs the surface over t
   CHECK(search.finish().error() == geometry::Flaw{Error::empty_cells, 2 * finest_spans + 5});
   REQUIRE(search.start(moments.grid(), model_over(moments, 0)).has_value());
   CHECK(search.finish().has_value());
+}
+
+TEST_CASE("shrinking takes no memory and gives none back, from the first time on") {
+  NetSearch search(SplineNet(32, 16), {.shrinks = true});
+  const std::size_t taken = test::allocations(), given = test::releases();
+  for (const auto& [u, v] : {std::pair(8, 16), std::pair(4, 4), std::pair(16, 32), std::pair(32, 16)})
+    search.shrink_to(u, v);
+  const std::size_t taken_after = test::allocations(), given_after = test::releases();
+  CHECK(taken_after == taken);
+  CHECK(given_after == given);
 }
 
 TEST_CASE("a search that has shrunk is one that was made so") {
