@@ -49,7 +49,7 @@ constexpr double most_noise = 1.5, least_noise = 0.5;
 constexpr std::size_t few_shots = 10;
 constexpr double most_repeatability = 1.6;
 // With more than this share of all shots against the others, the others are no better.
-constexpr double most_in_height = 1.0 / 3, most_aside = 1.0 / 4;
+constexpr double most_in_height = 1.0 / 3, most_aside = 1.0 / 4, most_aside_torn = 0.45;
 // A model explains the shots' disagreement when it takes away so much of its square.
 constexpr double explains = 0.4;
 
@@ -400,8 +400,8 @@ void Audit::check_agreement() {
   const auto share = [&](int count) {
     return static_cast<double>(count) / static_cast<double>(shots_.size());
   };
-  // A rim that is torn puts edges aside too.
-  const bool edges_contradict = !is_torn_ && apart_ > 1 && share(aside) > most_aside;
+  // A rim that is torn puts edges aside too, though of fewer shots than a wrong mount does.
+  const bool edges_contradict = apart_ > 1 && share(aside) > (is_torn_ ? most_aside_torn : most_aside);
   if (share(in_height) > most_in_height || edges_contradict)
     add({.kind = FindingKind::shot_edges,
          .gravity = Gravity::untrusted,
