@@ -96,10 +96,11 @@ class RobotCheck {
   void work(hal::Instant now) {
     driver_->receive(now);
     while (const auto event = driver_->next_event()) {
-      over_ =
-          over_ || event->kind == hal::RobotEvent::Kind::ready || event->kind == hal::RobotEvent::Kind::fault;
-      if (event->kind == hal::RobotEvent::Kind::ready) describe(event->pose, event->calibrated);
-      if (event->kind == hal::RobotEvent::Kind::fault) report_ = {false, std::string{event->text.view()}, {}};
+      using Kind = hal::RobotEvent::Kind;
+      const bool faulted = event->kind == Kind::fault || event->kind == Kind::manual;
+      over_ = over_ || event->kind == Kind::ready || faulted;
+      if (event->kind == Kind::ready) describe(event->pose, event->calibrated);
+      if (faulted) report_ = {false, std::string{event->text.view()}, {}};
     }
     if (!over_) driver_->transmit(now);
   }

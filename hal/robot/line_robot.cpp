@@ -23,7 +23,7 @@ constexpr std::size_t bytes_a_tick = 1024;  // a line of 115200 baud brings 12 i
 // 8N1: ten bits a character. The longest line out and the longest answer back.
 constexpr Duration time_of_two_lines(int baud) { return 2 * max_length * 10 * Duration{1s} / baud; }
 
-constexpr const char* in_manual_mode = "robot: it is in manual mode; switch it to automatic, then clear";
+constexpr const char* in_manual_mode = "robot: it is in manual mode; switch it to automatic, then go on";
 
 Message text_of_event(int code) {
   switch (static_cast<Event>(code)) {
@@ -291,7 +291,11 @@ void LineRobot::report_stopped_and_sync(Instant now) {
 void LineRobot::report_fault() {
   latched_ = true;
   why_ = text_;
-  events_.push({.kind = RobotEvent::Kind::fault, .pose = pose_, .code = code_, .text = text_});
+  const bool manual = code_ == std::to_underlying(Error::manual);
+  events_.push({.kind = manual ? RobotEvent::Kind::manual : RobotEvent::Kind::fault,
+                .pose = pose_,
+                .code = code_,
+                .text = text_});
 }
 
 // ---- what arrives

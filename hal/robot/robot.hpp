@@ -36,6 +36,7 @@ struct RobotEvent {
     stands,  // asked again while it stands, it says another place than before; a driver that cannot ask never says so
     refused,  // ERR: the controller will not do it; code says why
     fault,    // e-stop, power loss, watchdog, error during motion; latched
+    manual,   // the key is on manual: whoever has the pendant has the arm; latched as a fault is
     lost,     // the link is gone or the robot is silent beyond the limit
   };
   Kind kind;

@@ -41,6 +41,7 @@ void Cell::carry_out(CellAction action) {
   switch (action) {
     case CellAction::connect_and_calibrate:
       cycle_.begin(supervisor_.now());
+      if (settings_.devices) arm_.clear_fault(supervisor_.now());  // held in an earlier start
       return start_.begin();
     case CellAction::measure:
       return measurement_.begin();
@@ -85,6 +86,9 @@ void Cell::on_robot(const hal::RobotEvent& event) {
       supervisor_.record("robot", "refused", "", "", event.text);
       supervisor_.note(Notice::Kind::warning, event.text);
       return shots_.on_refusal(event.text);
+    case Kind::manual:
+      supervisor_.record("robot", "manual", "", "", event.text);
+      return start_.is_connecting() ? supervisor_.hold_start(event.text) : supervisor_.abort(event.text);
     case Kind::fault:
     case Kind::lost:
       supervisor_.record("robot", event.kind == Kind::fault ? "fault" : "lost", "", "", event.text);
@@ -92,12 +96,11 @@ void Cell::on_robot(const hal::RobotEvent& event) {
   }
 }
 
-// Before a run nothing is lost by ending it; in a run the shots are kept.
 void Cell::on_found(const hal::Pose& reported) {
   const auto no = arm_.found(reported);
   if (!no) return;
   supervisor_.record("robot", "implausible", "", "", *no);
-  if (supervisor_.state() == CellState::starting) return supervisor_.abort(*no, HoldCause::measurement);
+  if (supervisor_.state() == CellState::starting) return supervisor_.hold_start(*no);
   supervisor_.hold(HoldCause::person, *no);
 }
 

@@ -70,6 +70,10 @@ bool DeviceStart::both_ready() const {
   return scanner_ready() && arm_.robot().state() == hal::RobotState::ready;
 }
 
+bool DeviceStart::is_connecting() const {
+  return supervisor_.state() == CellState::starting && state_ == StartState::connecting;
+}
+
 bool DeviceStart::calibrates() const {
   return state_ == StartState::calibrating && arm_.robot().state() == hal::RobotState::moving;
 }

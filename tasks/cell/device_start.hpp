@@ -31,6 +31,7 @@ class DeviceStart {
 
   bool scanner_ready() const MOLDLOFT_NONBLOCKING;
   bool both_ready() const MOLDLOFT_NONBLOCKING;
+  bool is_connecting() const MOLDLOFT_NONBLOCKING;  // nothing was commanded yet
   bool calibrates() const MOLDLOFT_NONBLOCKING;  // the arm moves for it now
 
  private:

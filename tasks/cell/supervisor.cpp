@@ -82,6 +82,14 @@ void Supervisor::hold(HoldCause cause, const hal::Message& why) {
   apply(CellEvent::hold, why);
 }
 
+void Supervisor::hold_start(const hal::Message& why) {
+  if (state_ != CellState::starting) return;
+  begun_ = false;
+  cause_ = HoldCause::person;
+  why_ = why;
+  apply(CellEvent::hold, why);
+}
+
 void Supervisor::abort(const hal::Message& why, HoldCause cause) {
   if (state_ == CellState::aborting || state_ == CellState::aborted) return;
   why_ = why;

@@ -45,6 +45,8 @@ class Supervisor {
   void take_up_again() MOLDLOFT_NONBLOCKING { apply(CellEvent::unhold); }  // what held the cell has passed
   void done() MOLDLOFT_NONBLOCKING { apply(CellEvent::done); }             // what the present state does
   void hold(HoldCause, const hal::Message& why) MOLDLOFT_NONBLOCKING;
+  // In Starting, with nothing in motion, and for a person to mend: unhold begins the start once more.
+  void hold_start(const hal::Message& why) MOLDLOFT_NONBLOCKING;
   void abort(const hal::Message& why, HoldCause = HoldCause::person) MOLDLOFT_NONBLOCKING;
 
   CellState state() const MOLDLOFT_NONBLOCKING { return state_; }

@@ -10,7 +10,7 @@ using E = CellEvent;
 using A = CellAction;
 constexpr auto any = hal::always<CellContext>;
 
-// Held since the start: nothing is connected, nothing calibrated, nothing to go on with yet.
+// Held since the start, or in it: nothing is connected, nothing calibrated, nothing to go on with yet.
 constexpr hal::Guard<CellContext> not_begun{
     "not begun", [](const CellContext& c) MOLDLOFT_NONBLOCKING { return !c.begun; }};
 
@@ -24,6 +24,7 @@ constexpr CellTransition table[] = {
     {S::completing,  E::done,        any,         A::none,                   S::complete},
     {S::complete,    E::reset,       any,         A::forget_run,             S::resetting},
 
+    {S::starting,    E::hold,        any,         A::let_motion_end,         S::holding},
     {S::execute,     E::hold,        any,         A::let_motion_end,         S::holding},
     {S::holding,     E::done,        any,         A::none,                   S::held},
     {S::held,        E::unhold,      not_begun,   A::connect_and_calibrate,  S::starting},
@@ -64,7 +65,7 @@ constexpr CellTransition table[] = {
 // Commands that a line controller may send at any time and that mean nothing just now.
 constexpr hal::Ignored<S, E> ignored[] = {
     {S::idle, E::hold},       {S::idle, E::unhold},       {S::idle, E::clear},       {S::idle, E::reset},       {S::idle, E::done},
-    {S::starting, E::start},  {S::starting, E::hold},     {S::starting, E::unhold},  {S::starting, E::clear},   {S::starting, E::reset},
+    {S::starting, E::start},  {S::starting, E::unhold},  {S::starting, E::clear},   {S::starting, E::reset},
     {S::execute, E::start},   {S::execute, E::unhold},    {S::execute, E::clear},    {S::execute, E::reset},
     {S::completing, E::start}, {S::completing, E::hold},  {S::completing, E::unhold}, {S::completing, E::clear}, {S::completing, E::reset},
     {S::complete, E::start},  {S::complete, E::hold},     {S::complete, E::unhold},  {S::complete, E::clear},   {S::complete, E::done},

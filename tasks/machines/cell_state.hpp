@@ -58,7 +58,7 @@ enum class CellAction : std::uint8_t {
 };
 
 struct CellContext {
-  bool begun = false;  // Starting was entered: devices are connected, the arm is calibrated
+  bool begun = false;  // Starting was entered and not held: devices are connected, the arm is calibrated
 };
 
 using CellTransition = hal::Transition<CellState, CellEvent, CellAction, CellContext>;

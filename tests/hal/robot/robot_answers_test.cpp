@@ -41,12 +41,12 @@ TEST_CASE("a robot in manual mode is a fault that names it, and nothing that mov
   Cell cell;
   cell.peer.status.mode = robot_line::Status::Mode::manual;
   cell.robot.start(cell.clock.now());
-  REQUIRE(cell.run_until(Kind::fault));
-  CHECK(cell.events.back().text.view() == "robot: it is in manual mode; switch it to automatic, then clear");
+  REQUIRE(cell.run_until(Kind::manual));
+  CHECK(cell.events.back().text.view() == "robot: it is in manual mode; switch it to automatic, then go on");
   CHECK_FALSE(cell.robot.move(there, 50, cell.clock.now()));
   CHECK_FALSE(cell.robot.calibrate(cell.clock.now()));
   cell.robot.reset(cell.clock.now());  // too early: the same fault again
-  REQUIRE(cell.run_until(Kind::fault));
+  REQUIRE(cell.run_until(Kind::manual));
   cell.peer.status.mode = robot_line::Status::Mode::automatic;
   cell.robot.reset(cell.clock.now());
   REQUIRE(cell.run_until(Kind::ready));
@@ -59,7 +59,7 @@ TEST_CASE("the key turned to manual between two motions is a fault too, by ERR o
   refuses.start();
   refuses.peer.next_error = static_cast<int>(robot_line::Error::manual);
   REQUIRE(refuses.robot.move(there, 50, refuses.clock.now()));
-  REQUIRE(refuses.run_until(Kind::fault));
+  REQUIRE(refuses.run_until(Kind::manual));
   CHECK(refuses.events.back().text.view().find("manual mode") != std::string_view::npos);
 
   Cell shows;
@@ -68,7 +68,7 @@ TEST_CASE("the key turned to manual between two motions is a fault too, by ERR o
   REQUIRE(shows.robot.move(there, 50, shows.clock.now()));
   REQUIRE(shows.run_until(Kind::moving));
   shows.peer.status.mode = robot_line::Status::Mode::manual;
-  REQUIRE(shows.run_until(Kind::fault));
+  REQUIRE(shows.run_until(Kind::manual));
   CHECK(shows.robot.state() == RobotState::faulted);
 }
 

@@ -33,7 +33,7 @@ void report_elsewhere(const SimulatedCell& cell, int number, const hal::Pose& po
 
 }  // namespace
 
-TEST_CASE("a robot in manual mode ends the start by that name, and neither CAL nor MOV is sent") {
+TEST_CASE("a robot in manual mode is held at the start, by that name, and neither CAL nor MOV is sent") {
   ScriptedRun cell;
   hal::Instant ended{0};
   std::uint64_t calibrations = 0;
@@ -42,10 +42,34 @@ TEST_CASE("a robot in manual mode ends the start by that name, and neither CAL n
     calibrations = c.world.robot().counters().calibrations;
     ended = now;
   });
-  CHECK(run.exit_code == firmware_like::exit_aborted);
-  CHECK(message(run) == "robot: it is in manual mode; switch it to automatic, then clear");
+  CHECK(run.exit_code == firmware_like::exit_held);
+  CHECK(message(run) == "robot: it is in manual mode; switch it to automatic, then go on");
   CHECK(cell.motions + calibrations == 0);
   CHECK(ended < 10s);  // at once, not after the time for devices that do not answer
+}
+
+TEST_CASE(
+    "a start that was held in manual mode begins again with unhold, and holds again while it is too early") {
+  ScriptedRun cell;
+  cell.options.held = true;  // somebody is there
+  int told = 0;
+  bool held_at_start = false;
+  hal::Instant next{0};
+  const auto run = cell.run([&](const SimulatedCell& c, hal::Instant now) {
+    if (now < 2ms) c.world.robot().turn_key(true, now);
+    auto& controlled = c.controller.cell();
+    if (controlled.state() != CellState::held || now < next) return;
+    held_at_start =
+        held_at_start || (told > 0 && controlled.why().view().find("manual") != std::string_view::npos);
+    CHECK(cell.motions + c.world.robot().counters().calibrations == 0);
+    if (told == 2) c.world.robot().turn_key(false, now);
+    next = now + 2s;
+    if (++told <= 6) controlled.command(CellEvent::unhold);
+  });
+  CHECK(held_at_start);
+  CHECK(told == 3);  // begun, once too early, and with the key turned back
+  CHECK(run.exit_code == firmware_like::exit_done);
+  check_truth(run.summary);
 }
 
 TEST_CASE("the key turned to manual in mid-motion aborts the cell, and the arm stands") {
