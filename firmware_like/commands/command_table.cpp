@@ -3,6 +3,7 @@
 #include "firmware_like/commands/check_command.hpp"
 #include "firmware_like/commands/export_command.hpp"
 #include "firmware_like/commands/fit_command.hpp"
+#include "firmware_like/commands/inspect_command.hpp"
 #include "firmware_like/commands/latency_command.hpp"
 #include "firmware_like/commands/machines.hpp"
 #include "firmware_like/commands/option_values.hpp"
@@ -11,6 +12,7 @@
 #include "firmware_like/commands/run_command.hpp"
 #include "firmware_like/config/task_table.hpp"
 #include "firmware_like/gateway/operator_channel.hpp"
+#include "firmware_like/inspection/inspection.hpp"
 #include "firmware_like/process/complaint.hpp"
 #include "firmware_like/process/console.hpp"
 
@@ -108,6 +110,31 @@ RunCommand add_report(CLI::App& to) {
   return with(report, report_run);
 }
 
+RunCommand add_inspect(CLI::App& to) {
+  const auto inspect = std::make_shared<InspectOptions>();
+  to.add_option("run", inspect->run, "the run's folder")->required();
+  to.add_option("--against", inspect->design,
+                "the design: surface.json, design.json, STEP, IGES, points, a template list, or an earlier "
+                "run's folder")
+      ->required();
+  to.add_option("--align", inspect->align, alignment_names())->default_str("best");
+  to.add_option("--limit", inspect->limit, "mm that may differ: 3, or -2,3; default: nothing is judged");
+  to.add_option("--border-limit", inspect->border_limit, "the same near the border; default: as --limit");
+  to.add_option("--region", inspect->regions,
+                "NAME:x0,y0,x1,y1:LIMIT, in the design's x and y; may be repeated");
+  add_number_with_default(to, "--border-width", inspect->border_width_mm, {0.0, 10'000.0, "mm"},
+                          "what counts as border, mm");
+  to.add_option("--outline", inspect->outline, "use or ignore: of a plate that still has its margin")
+      ->default_str("use");
+  to.add_option("--datum", inspect->datum, "for --align datum: lines of x y z measured, x y z designed");
+  to.add_option("--unit", inspect->unit, "of a list of points: mm, cm, m, in or ft");
+  add_number_with_default(to, "--frames", inspect->frames, {1, 99},
+                          "frame lines, where the design names none");
+  to.add_option("--out", inspect->out, "where the results go; default: the run's folder");
+  to.add_flag("--force", inspect->force, "compare also what looks like another plate, or a run that is held");
+  return with(inspect, inspect_run);
+}
+
 RunCommand add_machines(CLI::App&) {
   return [] {
     show(cell_diagrams() + "\n" + driver_diagrams());
@@ -115,7 +142,7 @@ RunCommand add_machines(CLI::App&) {
   };
 }
 
-constexpr std::array<Command, 9> table{{
+constexpr std::array<Command, 10> table{{
     {"run", "measure one plate on the cell's devices", add_run},
     {"check", "all that can be known before a plate is measured", add_check},
     {"tell", "command a running cell, or ask for its status", add_tell},
@@ -124,6 +151,8 @@ constexpr std::array<Command, 9> table{{
     {"replay", "what a stored run did, in order of time", add_replay},
     {"latency", "timing self-test with fit and recorder busy", add_latency},
     {"report", "result and timing of a stored run, and its report.html made anew", add_report},
+    {"inspect", "a measured plate against its design: where it differs, and whether it keeps its limits",
+     add_inspect},
     {"machines", "print the state machines as Mermaid diagrams", add_machines},
 }};
 

@@ -16,6 +16,7 @@ enum ExitCode : int {
   exit_aborted = 3,
   exit_stopped = 4,  // by ctrl-C
   exit_warned = 5,   // measured, with warnings: the audit's findings
+  exit_differs = 6,  // inspected, and the plate is outside the limits
 };
 
 // Prints a failure as one line; returns its exit code.

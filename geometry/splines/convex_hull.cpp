@@ -1,7 +1,9 @@
 #include "geometry/splines/convex_hull.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <limits>
 
 namespace moldloft::geometry {
 namespace {
@@ -28,6 +30,27 @@ std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
   for (std::size_t i = points.size() - 1; i-- > 0;) add(points[i], lower);
   hull.pop_back();
   return hull;
+}
+
+PlanRectangle smallest_rectangle(const std::vector<Eigen::Vector2d>& hull) {
+  PlanRectangle best;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < hull.size(); ++i) {
+    const Eigen::Vector2d side = hull[(i + 1) % hull.size()] - hull[i];
+    if (!(side.norm() > 0)) continue;
+    const Eigen::Vector2d along = side.normalized(), across{-along.y(), along.x()};
+    double low = 0, high = 0, deep = 0;
+    for (const auto& p : hull) {
+      const double t = along.dot(p - hull[i]);
+      low = std::min(low, t), high = std::max(high, t);
+      deep = std::max(deep, std::abs(across.dot(p - hull[i])));
+    }
+    if ((high - low) * deep >= least) continue;
+    least = (high - low) * deep;
+    const bool turned = deep > high - low;
+    best = {turned ? across : along, turned ? deep : high - low, turned ? high - low : deep};
+  }
+  return best;
 }
 
 }  // namespace moldloft::geometry

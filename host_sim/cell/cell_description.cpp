@@ -25,16 +25,18 @@ Eigen::Vector2d middle_of(const CellDescription& cell) {
   return (cell.gantry.low_mm + 0.5 * cell.gantry.size_mm).head<2>();
 }
 
+std::expected<std::shared_ptr<const Plate>, SimError> shaped(const CellDescription& cell, Shape shape) {
+  return make_plate({shape, outline_corners(cell.outline, cell.sizes), cell.thickness_mm, cell.amplitude_mm,
+                     cell.radius_mm});
+}
+
 std::expected<std::shared_ptr<const Plate>, SimError> plate_of(const CellDescription& cell) {
   if (cell.made) return cell.made;
-  if (is_mesh(cell)) {
-    return read_mesh_plate(cell.plate, cell.unit.value_or(LengthUnit::millimetre), cell.thickness_mm);
+  if (cell.formed) {
+    const auto base = cell.formed->shape ? shaped(cell, *cell.formed->shape) : designed_plate(cell);
+    return base ? make_formed_plate(*base, *cell.formed) : base;
   }
-  const auto shape = shape_named(cell.plate);
-  if (!shape)
-    return std::unexpected(SimError{shape.error().what + ", or give the path of a PLY or STL file"});
-  return make_plate({*shape, outline_corners(cell.outline, cell.sizes), cell.thickness_mm, cell.amplitude_mm,
-                     cell.radius_mm});
+  return designed_plate(cell);
 }
 
 PlateInstance put_down(const std::shared_ptr<const Plate>& plate, const Placement& place) {
@@ -99,6 +101,16 @@ bool is_mesh(const CellDescription& cell) {
   std::error_code unknown;
   return name.find('/') != name.npos || name.ends_with(".ply") || name.ends_with(".stl") ||
          std::filesystem::exists(cell.plate, unknown);
+}
+
+std::expected<std::shared_ptr<const Plate>, SimError> designed_plate(const CellDescription& cell) {
+  if (is_mesh(cell)) {
+    return read_mesh_plate(cell.plate, cell.unit.value_or(LengthUnit::millimetre), cell.thickness_mm);
+  }
+  const auto shape = shape_named(cell.plate);
+  if (!shape)
+    return std::unexpected(SimError{shape.error().what + ", or give the path of a PLY or STL file"});
+  return shaped(cell, *shape);
 }
 
 std::unique_ptr<Arm> make_arm(const CellDescription& cell) {

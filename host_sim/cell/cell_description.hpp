@@ -17,6 +17,7 @@
 #include "host_sim/devices/robot_server.hpp"
 #include "host_sim/devices/scanner_server.hpp"
 #include "host_sim/faults/fault.hpp"
+#include "host_sim/plates/formed_plate.hpp"
 #include "host_sim/plates/mesh_plate.hpp"
 #include "host_sim/plates/plate_shape.hpp"
 
@@ -37,9 +38,11 @@ struct Placement {
 };
 
 struct CellDescription {
-  std::string plate = "saddle";    // a shape's name, or the path of a mesh file
+  std::string plate = "saddle";       // a shape's name, or the path of a mesh file
+  bool has_design = false;            // `plate` is what it was to become: the run's folder gets design.json
+  std::optional<Mistakes> formed;     // what it became instead; nullopt: what it was to become
   std::shared_ptr<const Plate> made;  // a plate that neither describes; `plate` is then only its name
-  std::optional<LengthUnit> unit;  // of that file; millimetres unless given
+  std::optional<LengthUnit> unit;     // of that file; millimetres unless given
   OutlineKind outline = OutlineKind::square;
   OutlineSizes sizes;
   double thickness_mm = 6, amplitude_mm = 10, radius_mm = 1000;
@@ -63,6 +66,9 @@ struct CellDescription {
 
 // Whether the plate is a mesh file: its word is no shape's, and there is such a file or the word looks like one.
 bool is_mesh(const CellDescription&);
+
+// What the plate was to become; of a cell without a design the plate itself, without its mistakes.
+std::expected<std::shared_ptr<const Plate>, SimError> designed_plate(const CellDescription&);
 
 std::unique_ptr<Arm> make_arm(const CellDescription&);
 

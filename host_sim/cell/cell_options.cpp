@@ -29,6 +29,12 @@ CLI::Option* add_named(CLI::App& command, const std::string& name, Value& value,
 
 // Options that say what a plate is not asked for: a mesh has its own outline, a formula its own unit.
 void refuse_contradictions(const CLI::App& command, const CellDescription& cell) {
+  if (command.count("--design") > 0 && command.count("--plate") > 0)
+    throw CLI::ValidationError("--design",
+                               "and --plate both say what the plate was to become: give one of them");
+  if (command.count("--formed") > 0 && command.count("--design") == 0)
+    throw CLI::ValidationError("--formed",
+                               "says how the plate differs from its design: --design is wanted too");
   if (!is_mesh(cell)) {
     if (command.count("--unit") > 0)
       throw CLI::ValidationError("--unit",
@@ -66,6 +72,24 @@ void add_cell_options(CLI::App& command, CellDescription& cell) {
   add_named(command, "--arm", cell.arm, arm_named, "scara (default) or gantry");
   add_number_with_default(command, "--seed", cell.seed, {0, std::numeric_limits<std::uint64_t>::max()},
                           "draws placement, noise and errors");
+  command.add_option_function<std::string>(
+      "--design",
+      [&cell](const std::string& shape) {
+        const auto known = shape_named(shape);
+        if (!known) throw CLI::ValidationError("--design", known.error().what);
+        cell.plate = shape;
+        cell.has_design = true;
+      },
+      "what the plate was to become, a shape as --plate: the run gets design.json");
+  command.add_option_function<std::string>(
+      "--formed",
+      [&cell](const std::string& text) {
+        const auto mistakes = mistakes_from(text);
+        if (!mistakes) throw CLI::ValidationError("--formed", mistakes.error().what);
+        cell.formed = *mistakes;
+      },
+      "what it became instead: [SHAPE], springback F, twist T mm, bow B mm, dent D mm at X,Y [radius R], "
+      "...");
   command.parse_complete_callback([&command, &cell] { refuse_contradictions(command, cell); });
 }
 

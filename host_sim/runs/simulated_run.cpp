@@ -3,6 +3,8 @@
 #include "firmware_like/config/device_makes.hpp"
 #include "firmware_like/config/plate_name.hpp"
 #include "firmware_like/controller/result_of.hpp"
+#include "firmware_like/inspection/design_reader.hpp"
+#include "firmware_like/process/whole_file.hpp"
 #include "firmware_like/report/result_files.hpp"
 #include "firmware_like/results/summary.hpp"
 #include "hal/links/cable.hpp"
@@ -86,6 +88,19 @@ std::expected<firmware_like::RunFolder, firmware_like::Failure> folder_for(
                                    firmware_like::RunKind::simulated, names);
 }
 
+// design.json, in plate coordinates: what the plate was to become, and nothing of where it lies.
+std::expected<void, SimError> write_design(const CellDescription& cell, const std::filesystem::path& folder) {
+  if (!cell.has_design) return {};
+  const auto plate = designed_plate(cell);
+  if (!plate) return std::unexpected{plate.error()};
+  const geometry::DesignFace face{spline_of(**plate), {}};
+  const auto text =
+      firmware_like::json_text(firmware_like::design_json({&face, 1}, "moldloft-sim, shape " + cell.plate), 1) + "\n";
+  const auto written = firmware_like::write_file(folder / "design.json", text);
+  if (!written) return std::unexpected{SimError{written.error().what}};
+  return {};
+}
+
 // A plate that was moved meanwhile may be measured where it lay or where it lies: the better of the two counts.
 std::expected<Verdict, SimError> judge_where_it_lay(const PlateInstance& put_down,
                                                     const SimulatedWorld& world,
@@ -149,6 +164,8 @@ std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& option
   if (options.write_everything) {
     const auto written = write_results(result, *folder, errors);
     if (!written) return std::unexpected{SimError{written.error().what}};
+    if (const auto design = write_design(options.cell, folder->path); !design)
+      return std::unexpected{design.error()};
   }
   return run;
 }
