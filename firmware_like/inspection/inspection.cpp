@@ -22,6 +22,8 @@ constexpr int histogram_bins = 40;
 constexpr std::size_t most_worst = 5;
 constexpr double worst_apart = 0.15;  // of the plate's size
 constexpr double close_sigmas = 2;
+constexpr double strangers_share =
+    0.1;                               // of a list's points beyond the plate: it is not a list of this plate
 constexpr double nowhere_share = 0.5;  // of the plate without a partner: the two do not lie on each other
 
 std::unexpected<Failure> refuse(std::string what) { return std::unexpected(Failure{std::move(what)}); }
@@ -50,12 +52,20 @@ Spread spread_of(std::vector<double> values) {
   return s;
 }
 
-// The uncertainty of a deviation: of the shot that saw the place, and of the pose.
-double sigma_at(const geometry::PlateAlignment& a, const Vector3d& at, const Vector3d& normal,
-                double shot_sigma_mm) {
+// The uncertainty of a deviation: of the shot that saw the place, of the pose, and in a corner, where the fit has few
+// points to hold on to, of the surface itself.
+double sigma_at(const geometry::PlateAlignment& a, const RunResult& result, const Vector3d& at,
+                const Vector3d& normal, double u, double v) {
   geometry::Vector6 row;
   row << normal, (at - a.centroid).cross(normal);
-  return std::sqrt(shot_sigma_mm * shot_sigma_mm + row.dot(a.covariance * row));
+  double square = std::pow(result.promised.repeatability_z_mm, 2) + row.dot(a.covariance * row);
+  const auto& fit = result.measured->fit;
+  for (int corner = 0; corner < 4; ++corner) {
+    const double from_u = corner == 0 || corner == 3 ? u : 1 - u, from_v = corner < 2 ? v : 1 - v;
+    const double part = std::max(0.0, 1 - from_u * fit.spans_u) * std::max(0.0, 1 - from_v * fit.spans_v);
+    square += std::pow(part * fit.corner_sigma_mm[static_cast<std::size_t>(corner)], 2);
+  }
+  return std::sqrt(square);
 }
 
 class Inspector {
@@ -123,15 +133,14 @@ void Inspector::map(const DesignFaces& design) {
       const double u = static_cast<double>(i) / map_cells, v = static_cast<double>(k) / map_cells;
       const Vector3d at = out_.design_from_world * s.at(u, v).value;
       const auto foot = design.foot(at);
-      out_.places.push_back(
-          {.at = at,
-           .mm = side * foot.signed_mm,
-           .sigma_mm = sigma_at(out_.alignment, at, foot.normal, result_.promised.repeatability_z_mm),
-           .u = static_cast<float>(u),
-           .v = static_cast<float>(v),
-           .border = distance_to(design.border(), at) < settings_.border_width_mm,
-           .beyond = foot.overhang_mm > no_partner_mm || !foot.converged,
-           .region = region_at(at)});
+      out_.places.push_back({.at = at,
+                             .mm = side * foot.signed_mm,
+                             .sigma_mm = sigma_at(out_.alignment, result_, at, foot.normal, u, v),
+                             .u = static_cast<float>(u),
+                             .v = static_cast<float>(v),
+                             .border = distance_to(design.border(), at) < settings_.border_width_mm,
+                             .beyond = foot.overhang_mm > no_partner_mm || !foot.converged,
+                             .region = region_at(at)});
     }
   }
 }
@@ -328,7 +337,7 @@ std::expected<Inspection, Failure> Inspector::by_points() {
     InspectedPlace place{
         .at = p,
         .mm = -foot.signed_mm,  // the plate stands higher where the design's point lies below it
-        .sigma_mm = sigma_at(out_.alignment, q, foot.normal, result_.promised.repeatability_z_mm),
+        .sigma_mm = sigma_at(out_.alignment, result_, q, foot.normal, foot.u, foot.v),
         .u = static_cast<float>(foot.u),
         .v = static_cast<float>(foot.v),
         .border = distance_to(measured_.border(), q) < settings_.border_width_mm,
@@ -337,9 +346,10 @@ std::expected<Inspection, Failure> Inspector::by_points() {
     beyond += place.beyond ? 1 : 0;
     out_.places.push_back(place);
   }
-  if (static_cast<double>(beyond) > nowhere_share * static_cast<double>(out_.places.size()))
-    return refuse(fmt::format("{}: {} of its {} points lie beyond the plate; choose another --align",
-                              design_.file, beyond, out_.places.size()));
+  if (static_cast<double>(beyond) > strangers_share * static_cast<double>(out_.places.size()))
+    return refuse(fmt::format(
+        "{}: {} of its {} points lie beyond the plate: a list of another plate? Or choose another --align",
+        design_.file, beyond, out_.places.size()));
   if (beyond > 0)
     out_.remarks.push_back(
         fmt::format("{} of {} points lie beyond the plate and are not judged", beyond, out_.places.size()));

@@ -29,7 +29,10 @@ constexpr double as_good = 1.15, as_good_mm = 0.02;  // than the best pose: noth
 constexpr double mirror_better = 0.6, mirror_clearly_mm = 0.1;
 constexpr double outline_share = 0.02, outline_least_mm = 1.5;  // rms of an outline that is not this plate's
 constexpr double point_sigma_mm = 0.01;  // of a place of the fitted surface, from the points' noise
-constexpr double least_edge_sigma_mm = 0.02;
+constexpr double another_share = 0.75, formed_share = 0.5, another_least_mm = 0.5;  // of the design's depth
+constexpr double rim_mm = 3;  // beyond the design's border: the plate's own edge is still held to its side
+// What an arm errs in plan from one place to another, and a whole stretch of edge with it; its points do not show it.
+constexpr double least_edge_sigma_mm = 0.06;
 
 std::unexpected<Failure> refuse(std::string what) { return std::unexpected(Failure{std::move(what)}); }
 
@@ -127,21 +130,30 @@ std::vector<Vector3d> mirrored(std::span<const Vector3d> points, const Vector3d&
 struct Question {
   const DesignFaces& fixed;
   std::span<const Vector3d> points, edges, outline;  // edges empty: the outline only says where to start
-  std::span<const std::uint16_t> groups;
+  std::span<const std::uint16_t> point_groups, edge_groups;
   Vector3d up;
   PlateAlignmentSettings settings;
   bool with_border = true, may_be_mirrored = true;
 };
 
 std::expected<End, Failure> best_end(const Question& q, std::vector<std::string>& remarks) {
-  const PlateToAlign moving{.points = q.points, .edges = q.edges, .groups = q.groups, .up = q.up};
+  const PlateToAlign moving{.points = q.points,
+                            .edges = q.edges,
+                            .point_groups = q.point_groups,
+                            .edge_groups = q.edge_groups,
+                            .up = q.up};
   auto ends = ends_of(q.fixed, moving, q.outline, q.settings, q.with_border);
   if (ends.empty())
     return refuse("plate and design cannot be laid on each other: no pose was found from any side");
   if (q.may_be_mirrored) {
     const auto points = mirrored(q.points, q.outline[0], q.up), edges = mirrored(q.edges, q.outline[0], q.up),
                outline = mirrored(q.outline, q.outline[0], q.up);
-    const auto others = ends_of(q.fixed, {.points = points, .edges = edges, .groups = q.groups, .up = q.up},
+    const auto others = ends_of(q.fixed,
+                                {.points = points,
+                                 .edges = edges,
+                                 .point_groups = q.point_groups,
+                                 .edge_groups = q.edge_groups,
+                                 .up = q.up},
                                 outline, q.settings, q.with_border);
     const double direct = ends.front().score();
     if (!others.empty() && others.front().score() < mirror_better * direct &&
@@ -215,7 +227,11 @@ std::expected<void, Failure> lift_to_one_side(const DesignFaces& design, const P
   design.up().cwiseAbs().maxCoeff(&up);
   for (Eigen::Index k = 0; k < 3; ++k) settings.fixed[static_cast<std::size_t>(k)] = k != up;
   settings.fixed[static_cast<std::size_t>(3 + up)] = true;
-  const auto lies = geometry::localize(design.surface(0), plate.points, settings);
+  // The rim is where a plate touches first.
+  auto points = plate.points;
+  points.insert(points.end(), plate.edges.begin(), plate.edges.end());
+  settings.border_tolerance_mm = rim_mm;
+  const auto lies = geometry::localize(design.surface(0), points, settings);
   if (!lies)
     return refuse(fmt::format("no one-sided pose was found: {}", geometry::to_string(lies.error().error)));
   match.design_from_world = lies->design_from_plate;
@@ -287,6 +303,46 @@ double depth_of(std::span<const Vector3d> points) {
   return std::sqrt(square / static_cast<double>(points.size()));
 }
 
+// The border finely, then evenly by length; what one boundary shot has seen is a group.
+void add_outline(const geometry::BSplineSurface& s, double field_mm, PlateSamples& to) {
+  constexpr int fine = 400;  // a side
+  std::vector<Vector3d> line;
+  for (int side = 0; side < 4; ++side) {
+    for (int k = 0; k < fine; ++k) {
+      const double t = static_cast<double>(k) / fine;
+      const double u = side == 0 ? t : side == 1 ? 1 : side == 2 ? 1 - t : 0;
+      const double v = side == 0 ? 0 : side == 1 ? t : side == 2 ? 1 : 1 - t;
+      line.push_back(s.at(u, v).value);
+    }
+  }
+  line.push_back(line.front());
+  double all = 0;
+  for (std::size_t k = 1; k < line.size(); ++k) all += (line[k] - line[k - 1]).norm();
+  const double pitch = all / (4 * edges_a_side);
+  double way = 0, due = pitch / 2;
+  for (std::size_t k = 1; k < line.size(); ++k) {
+    way += (line[k] - line[k - 1]).norm();
+    for (; way >= due; due += pitch) {
+      to.edges.push_back(line[k]);
+      to.edge_groups.push_back(static_cast<std::uint16_t>(due / field_mm));
+    }
+  }
+}
+
+// A plate that is formed, and not to this: half formed it would differ by half of the design's depth.
+bool is_another(double rms_mm, double design_depth_mm, double plate_depth_mm) {
+  return rms_mm > another_least_mm && rms_mm > another_share * design_depth_mm &&
+         plate_depth_mm > formed_share * design_depth_mm;
+}
+
+std::string another_words(double rms_mm, double design_depth_mm) {
+  return fmt::format(
+      "the plate is formed, and differs from this design by {:.1f} mm rms (a flat sheet would by {:.1f} mm): "
+      "another "
+      "plate's design? (--force compares all the same)",
+      rms_mm, design_depth_mm);
+}
+
 }  // namespace
 
 PlateSamples samples_of(const RunResult& result) {
@@ -298,33 +354,15 @@ PlateSamples samples_of(const RunResult& result) {
   for (int i = 0; i < samples_a_side; ++i) {
     for (int k = 0; k < samples_a_side; ++k) {
       const auto r = s.at((i + 0.5) / samples_a_side, (k + 0.5) / samples_a_side);
-      all.points.push_back(r.value);
       const auto cell = [](double x, double field) { return static_cast<int>(std::floor(x / field)) & 255; };
-      all.groups.push_back(
+      all.points.push_back(r.value);
+      all.point_groups.push_back(
           static_cast<std::uint16_t>(cell(r.value.x(), field_x) * 256 + cell(r.value.y(), field_y)));
       up += r.du.cross(r.dv);
     }
   }
   all.up = up.normalized();
-  for (const auto& [from, to] : {std::pair{Eigen::Vector2d{0, 0}, Eigen::Vector2d{1, 0}},
-                                 {Eigen::Vector2d{1, 0}, Eigen::Vector2d{1, 1}},
-                                 {Eigen::Vector2d{1, 1}, Eigen::Vector2d{0, 1}},
-                                 {Eigen::Vector2d{0, 1}, Eigen::Vector2d{0, 0}}}) {
-    // Finely along the side, then evenly by length.
-    constexpr int fine = 400;
-    std::vector<Vector3d> line;
-    double length = 0;
-    for (int k = 0; k <= fine; ++k) {
-      const Eigen::Vector2d uv = from + (to - from) * k / fine;
-      line.push_back(s.at(uv.x(), uv.y()).value);
-      if (k > 0) length += (line[static_cast<std::size_t>(k)] - line[static_cast<std::size_t>(k) - 1]).norm();
-    }
-    double way = 0, due = length / edges_a_side / 2;
-    for (std::size_t k = 1; k < line.size(); ++k) {
-      way += (line[k] - line[k - 1]).norm();
-      for (; way >= due; due += length / edges_a_side) all.edges.push_back(line[k]);
-    }
-  }
+  add_outline(s, std::min(field_x, field_y), all);
   return all;
 }
 
@@ -343,7 +381,8 @@ std::expected<PlateMatch, Failure> match_faces(const DesignFaces& design, const 
                           .points = plate.points,
                           .edges = plate.edges,
                           .outline = plate.edges,
-                          .groups = plate.groups,
+                          .point_groups = plate.point_groups,
+                          .edge_groups = plate.edge_groups,
                           .up = plate.up,
                           .settings = alignment_settings(result, settings),
                           .with_border = settings.with_outline};
@@ -364,12 +403,9 @@ std::expected<PlateMatch, Failure> match_faces(const DesignFaces& design, const 
   std::vector<Vector3d> feet;
   for (const auto& p : plate.points) feet.push_back(design.foot(match.design_from_world * p).point);
   const double design_depth = depth_of(feet);
-  if (kind == DesignKind::surface && end->alignment.rms_mm > 1.2 * design_depth &&
-      plate_depth > 0.3 * design_depth && end->alignment.rms_mm > 0.5 && !settings.insists)
-    return refuse(fmt::format(
-        "the plate differs from this design by {:.1f} mm rms, a flat sheet would by {:.1f} mm: another "
-        "plate's design? (--force compares all the same)",
-        end->alignment.rms_mm, design_depth));
+  if (kind == DesignKind::surface && is_another(end->alignment.rms_mm, design_depth, plate_depth) &&
+      !settings.insists)
+    return refuse(another_words(end->alignment.rms_mm, design_depth));
   if (settings.method == AlignmentMethod::corners) {
     if (auto laid = lay_on_corners(design, result, match); !laid) return std::unexpected(laid.error());
   }
@@ -429,9 +465,10 @@ std::expected<PlateMatch, Failure> match_points(const DesignFaces& measured, con
       .points = design.points,
       .edges = has_edges ? std::span<const Vector3d>{outline} : std::span<const Vector3d>{},
       .outline = outline,
-      .groups = {},
+      .point_groups = {},
+      .edge_groups = {},
       .up = up.z() < 0 ? Vector3d{-up} : up,
-      .settings = {.robust = settings.method == AlignmentMethod::robust, .border_tolerance_mm = 5},
+      .settings = {.robust = settings.method == AlignmentMethod::robust, .points_belong = true},
       .with_border = has_edges};
   const auto end = best_end(question, match.remarks);
   if (!end) return std::unexpected(end.error());
@@ -446,12 +483,8 @@ std::expected<PlateMatch, Failure> match_points(const DesignFaces& measured, con
         "{}: its seams and ends lie {:.1f} mm rms from the plate's outline: a list of another plate?",
         design.file, end->alignment.border_rms_mm));
   const double depth = depth_of(design.points);
-  if (end->alignment.rms_mm > 1.2 * depth && depth_of(plate.points) > 0.3 * depth &&
-      end->alignment.rms_mm > 0.5 && !settings.insists)
-    return refuse(fmt::format(
-        "{}: the plate differs from it by {:.1f} mm rms, a flat sheet would by {:.1f} mm: a list of another "
-        "plate? (--force compares all the same)",
-        design.file, end->alignment.rms_mm, depth));
+  if (is_another(end->alignment.rms_mm, depth, depth_of(plate.points)) && !settings.insists)
+    return refuse(fmt::format("{}: {}", design.file, another_words(end->alignment.rms_mm, depth)));
   return match;
 }
 

@@ -14,7 +14,7 @@ namespace moldloft::firmware_like {
 // The measured plate as an alignment asks for it. World frame.
 struct PlateSamples {
   std::vector<Eigen::Vector3d> points, edges;
-  std::vector<std::uint16_t> groups;  // one exposure's field each
+  std::vector<std::uint16_t> point_groups, edge_groups;  // one exposure's field each
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
 };
 PlateSamples samples_of(const RunResult&);

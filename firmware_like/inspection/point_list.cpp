@@ -49,8 +49,13 @@ struct Style {
   }
 };
 
-constexpr std::array<Style, 6> styles{
-    {{';', false}, {';', true}, {'\t', true}, {',', false}, {std::nullopt, false}, {std::nullopt, true}}};
+constexpr std::array<Style, 7> styles{{{';', false},
+                                       {';', true},
+                                       {'\t', false},
+                                       {'\t', true},
+                                       {',', false},
+                                       {std::nullopt, false},
+                                       {std::nullopt, true}}};
 
 bool is_remark(std::string_view line) {
   const auto at = line.find_first_not_of(" \t");

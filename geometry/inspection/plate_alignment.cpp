@@ -6,6 +6,7 @@
 #include <Eigen/SVD>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -18,8 +19,9 @@ using Square = Eigen::Matrix<double, 6, 6>;
 
 constexpr double sigma_from_median = 1.4826;  // of normal noise
 constexpr double least_scale_mm = 2e-4;       // of the biweight: below it rounding would be an outlier
-constexpr double settled_mm = 1e-7;           // way of the points by a step
-constexpr double undetermined = 1e-4;         // eigenvalue against the largest: slopes below 1 %
+constexpr double settled_mm = 1e-6, nearly_settled_mm = 1e-3;  // way of the points by a step
+constexpr double undetermined = 1e-4;   // eigenvalue against the largest: slopes below 1 %
+constexpr double difference_mm = 0.05;  // for second derivatives: small against any curvature
 constexpr double grown = 1 + 1e-9, first_damping = 1e-3, more_damping = 10, most_damping = 1e6;
 
 // One equation: the distance, and how a small motion changes it.
@@ -53,11 +55,8 @@ const BorderSample& nearest(const std::vector<BorderSample>& border, const Vecto
 class Alignment {
  public:
   Alignment(const DesignFaces& design, const PlateToAlign& plate, const PlateAlignmentSettings& settings)
-      : design_{design},
-        plate_{plate},
-        settings_{settings},
-        points_(plate.points.size()),
-        edges_(plate.edges.size()) {
+      : design_{design}, plate_{plate}, settings_{settings}, points_(plate.points.size()) {
+    edges_.reserve(plate.edges.size());
     centroid_ = Vector3d::Zero();
     for (const auto& p : plate.points) centroid_ += p;
     centroid_ /= static_cast<double>(plate.points.size());
@@ -70,10 +69,12 @@ class Alignment {
 
  private:
   void look(const RigidMotion&);  // all equations at a pose
+  void add_edge(const Vector3d& q, const Vector3d& centre);
   void weigh();
   void sum(Matrix6& normal, Vector6& gradient, double& square) const;
   RigidMotion moved(const RigidMotion&, const Vector6& step) const;
-  void describe(const RigidMotion&, PlateAlignment&) const;
+  void describe(const RigidMotion&, PlateAlignment&);
+  Matrix6 second_derivatives(const RigidMotion&);
   Matrix6 error_sums() const;
 
   const DesignFaces& design_;
@@ -94,23 +95,26 @@ Vector6 row_of(const Vector3d& normal, const Vector3d& arm, double radius) {
 void Alignment::look(const RigidMotion& pose) {
   const Vector3d c = pose * centroid_;
   beyond_ = 0;
+  edges_.clear();
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Vector3d q = pose * plate_.points[i];
     const auto foot = design_.foot(q);
-    const bool beyond = foot.overhang_mm > settings_.border_tolerance_mm;
+    const bool beyond = !settings_.points_belong && foot.overhang_mm > settings_.border_tolerance_mm;
     beyond_ += beyond ? 1 : 0;
     points_[i] = {.row = row_of(foot.normal, q - c, radius_),
                   .distance = foot.signed_mm,
                   .weight = beyond || !foot.converged ? 0.0 : 1.0};
+    if (settings_.points_belong && foot.overhang_mm > 0) add_edge(q, c);
   }
   if (!settings_.with_border) return;
-  for (std::size_t k = 0; k < edges_.size(); ++k) {
-    const Vector3d q = pose * plate_.edges[k];
-    const auto& border = nearest(design_.border(), q);
-    edges_[k] = {.row = row_of(border.outward, q - c, radius_),
-                 .distance = border.outward.dot(q - border.at),
-                 .weight = 1};
-  }
+  for (const auto& p : plate_.edges) add_edge(pose * p, c);
+}
+
+void Alignment::add_edge(const Vector3d& q, const Vector3d& c) {
+  const auto& border = nearest(design_.border(), q);
+  edges_.push_back({.row = row_of(border.outward, q - c, radius_),
+                    .distance = border.outward.dot(q - border.at),
+                    .weight = 1});
 }
 
 // Weights of each kind sum to 1, so that neither drowns the other.
@@ -157,24 +161,39 @@ RigidMotion Alignment::moved(const RigidMotion& pose, const Vector6& step) const
 // The sum of squares of what each error that stands for itself does to the gradient.
 Matrix6 Alignment::error_sums() const {
   Matrix6 sums = Matrix6::Zero();
-  std::map<std::uint16_t, Vector6> together;
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Vector6 g = points_[i].weight * points_[i].row;
-    sums += settings_.point_sigma_mm * settings_.point_sigma_mm * g * g.transpose();
-    if (plate_.groups.empty()) continue;
-    const auto [at, first] = together.try_emplace(plate_.groups[i], Vector6::Zero());
-    at->second += g;
-  }
-  for (const auto& [group, g] : together)
-    sums += settings_.group_sigma_mm * settings_.group_sigma_mm * g * g.transpose();
-  for (const auto& e : edges_) {
-    const Vector6 g = e.weight * e.row;
-    sums += settings_.edge_sigma_mm * settings_.edge_sigma_mm * g * g.transpose();
-  }
+  const auto add = [&](const std::vector<Equation>& equations, std::span<const std::uint16_t> groups,
+                       double group_sigma, double own_sigma) {
+    std::map<std::uint16_t, Vector6> together;
+    for (std::size_t i = 0; i < equations.size(); ++i) {
+      const Vector6 g = equations[i].weight * equations[i].row;
+      sums += own_sigma * own_sigma * g * g.transpose();
+      if (i < groups.size()) together.try_emplace(groups[i], Vector6::Zero()).first->second += g;
+    }
+    for (const auto& [group, g] : together) sums += group_sigma * group_sigma * g * g.transpose();
+  };
+  add(points_, plate_.point_groups, settings_.group_sigma_mm, settings_.point_sigma_mm);
+  add(edges_, plate_.edge_groups, settings_.edge_sigma_mm,
+      plate_.edge_groups.empty() ? settings_.edge_sigma_mm : 0);
   return sums;
 }
 
-void Alignment::describe(const RigidMotion& pose, PlateAlignment& out) const {
+// Of half the sum of squares, by central differences of its gradient.
+Matrix6 Alignment::second_derivatives(const RigidMotion& pose) {
+  Matrix6 all, normal;
+  double square = 0;
+  for (int k = 0; k < 6; ++k) {
+    std::array<Vector6, 2> gradients;
+    for (const int side : {0, 1}) {
+      look(moved(pose, (side == 0 ? -difference_mm : difference_mm) * Vector6::Unit(k)));
+      weigh();
+      sum(normal, gradients[static_cast<std::size_t>(side)], square);
+    }
+    all.col(k) = (gradients[1] - gradients[0]) / (2 * difference_mm);
+  }
+  return (all + all.transpose()) / 2;
+}
+
+void Alignment::describe(const RigidMotion& pose, PlateAlignment& out) {
   out.design_from_plate = pose;
   out.centroid = pose * centroid_;
   out.radius_mm = radius_;
@@ -188,10 +207,15 @@ void Alignment::describe(const RigidMotion& pose, PlateAlignment& out) const {
   out.rms_mm = weight > 0 ? std::sqrt(square / weight) : 0;
   out.border_rms_mm = border_weight > 0 ? std::sqrt(border / border_weight) : 0;
 
+  const Matrix6 errors = error_sums();
   Matrix6 normal, inverse = Matrix6::Zero();
   Vector6 gradient;
   sum(normal, gradient, square);
-  const Eigen::SelfAdjointEigenSolver<Square> eigen{Square{normal}};
+  const Eigen::SelfAdjointEigenSolver<Square> first{Square{normal}};
+  // A plate that is far from its design pulls at its pose through the surface's curvature too: the full second
+  // derivatives say how it answers to an error, where they can be had.
+  const Eigen::SelfAdjointEigenSolver<Square> full{Square{second_derivatives(pose)}};
+  const auto& eigen = full.eigenvalues()[0] > undetermined * full.eigenvalues()[5] ? full : first;
   for (int k = 0; k < 6; ++k) {
     const Vector6 direction = eigen.eigenvectors().col(k);
     if (eigen.eigenvalues()[k] < undetermined * eigen.eigenvalues()[5]) {
@@ -202,7 +226,7 @@ void Alignment::describe(const RigidMotion& pose, PlateAlignment& out) const {
   }
   Vector6 scale;
   scale << Vector3d::Ones(), Vector3d::Constant(1 / radius_);
-  out.covariance = scale.asDiagonal() * (inverse * error_sums() * inverse) * scale.asDiagonal();
+  out.covariance = scale.asDiagonal() * (inverse * errors * inverse) * scale.asDiagonal();
 }
 
 std::expected<PlateAlignment, Flaw> Alignment::run() {
@@ -213,6 +237,7 @@ std::expected<PlateAlignment, Flaw> Alignment::run() {
   Vector6 gradient;
   double square = 0;
   bool settled = false;
+  double last_step = 0;
   Eigen::SelfAdjointEigenSolver<Square> eigen;
   for (out.iterations = 0; out.iterations < settings_.most_iterations && !settled; ++out.iterations) {
     look(pose);
@@ -238,14 +263,16 @@ std::expected<PlateAlignment, Flaw> Alignment::run() {
       if (value < least) continue;
       step -= eigen.eigenvectors().col(k) * (eigen.eigenvectors().col(k).dot(gradient) / (value + damping));
     }
-    settled = step.norm() < settled_mm && damping < first_damping;
+    last_step = step.norm();
+    settled = last_step < settled_mm && damping < first_damping;
     pose = moved(pose, step);
   }
   look(pose);
   weigh();
   describe(pose, out);
-  // A robust fit may swing by some micrometres for ever: which points count changes with each step.
-  if (!settled && !settings_.robust) return std::unexpected(Flaw{Error::not_converged});
+  // Which points count, and which sample of the border is the nearest, may change to and fro by a hair for ever.
+  if (!settled && !settings_.robust && last_step > nearly_settled_mm)
+    return std::unexpected(Flaw{Error::not_converged});
   return out;
 }
 
@@ -254,7 +281,8 @@ std::expected<PlateAlignment, Flaw> Alignment::run() {
 std::expected<PlateAlignment, Flaw> align(const DesignFaces& design, const PlateToAlign& plate,
                                           const PlateAlignmentSettings& settings) {
   if (plate.points.size() < 6) return std::unexpected(Flaw{Error::too_few_points});
-  if (!plate.groups.empty() && plate.groups.size() != plate.points.size())
+  if ((!plate.point_groups.empty() && plate.point_groups.size() != plate.points.size()) ||
+      (!plate.edge_groups.empty() && plate.edge_groups.size() != plate.edges.size()))
     return std::unexpected(Flaw{Error::sizes_differ});
   for (const auto points : {plate.points, plate.edges}) {
     for (std::size_t i = 0; i < points.size(); ++i) {

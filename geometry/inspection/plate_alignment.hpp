@@ -9,7 +9,7 @@
 // Frame        the plate's, and the motion to the design's; mm, rad
 // Covariance   of the small motion (t, w) after the result, q -> c + exp([w])(q - c) + t about the points' centroid c,
 //              design frame: t in mm first, then w in rad. Points of one group (an exposure) err together by
-//              group_sigma_mm, so thousands of points do not make a pose a thousand times surer than ten exposures do
+//              group_sigma_mm, edges by edge_sigma_mm, so thousands of points do not make a pose a thousand times surer than ten exposures do
 // Undetermined a direction in which neither surface nor outline changes is not followed: the pose stays where the start
 //              has it, and the result names it
 // Cost         0.3 us a point and iteration; 5 to 20 iterations
@@ -30,9 +30,10 @@
 namespace moldloft::geometry {
 
 struct PlateToAlign {
-  std::span<const Eigen::Vector3d> points;        // of its surface, evenly spread
-  std::span<const Eigen::Vector3d> edges;         // of its outline, evenly spread; may be empty
-  std::span<const std::uint16_t> groups;          // of every point; empty: each errs for itself
+  std::span<const Eigen::Vector3d> points;      // of its surface, evenly spread
+  std::span<const Eigen::Vector3d> edges;       // of its outline, evenly spread; may be empty
+  std::span<const std::uint16_t> point_groups;  // of every point or edge; empty: each errs for itself
+  std::span<const std::uint16_t> edge_groups;
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // the side that was measured
 };
 
@@ -40,8 +41,10 @@ struct PlateAlignmentSettings {
   RigidMotion start = RigidMotion::Identity();
   bool robust = false;
   bool with_border = true;
+  bool points_belong =
+      false;  // every point has a partner on the design: one beyond the border is drawn back to it
   double border_tolerance_mm = 0.5;  // points farther beyond the design's border have no partner there
-  double point_sigma_mm = 0.05, group_sigma_mm = 0.013, edge_sigma_mm = 0.1;
+  double point_sigma_mm = 0.05, group_sigma_mm = 0.013, edge_sigma_mm = 0.05;
   int most_iterations = 80;
 };
 
