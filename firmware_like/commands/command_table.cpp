@@ -113,9 +113,7 @@ RunCommand add_report(CLI::App& to) {
 RunCommand add_inspect(CLI::App& to) {
   const auto inspect = std::make_shared<InspectOptions>();
   to.add_option("run", inspect->run, "the run's folder")->required();
-  to.add_option("--against", inspect->design,
-                "the design: surface.json, design.json, STEP, IGES, points, a template list, or an earlier "
-                "run's folder")
+  to.add_option("--against", inspect->design, "STEP, IGES, surface.json, points, template list, or a run")
       ->required();
   to.add_option("--align", inspect->align, alignment_names())->default_str("best");
   to.add_option("--limit", inspect->limit, "mm that may differ: 3, or -2,3; default: nothing is judged");
@@ -151,8 +149,7 @@ constexpr std::array<Command, 10> table{{
     {"replay", "what a stored run did, in order of time", add_replay},
     {"latency", "timing self-test with fit and recorder busy", add_latency},
     {"report", "result and timing of a stored run, and its report.html made anew", add_report},
-    {"inspect", "a measured plate against its design: where it differs, and whether it keeps its limits",
-     add_inspect},
+    {"inspect", "where a measured plate differs from its design", add_inspect},
     {"machines", "print the state machines as Mermaid diagrams", add_machines},
 }};
 

@@ -8,7 +8,7 @@
 #include "firmware_like/process/complaint.hpp"
 #include "firmware_like/process/console.hpp"
 #include "firmware_like/process/whole_file.hpp"
-#include "firmware_like/report/frame_page.hpp"
+#include "firmware_like/inspection/frame_page.hpp"
 #include "firmware_like/results/stored_result.hpp"
 #include "firmware_like/run/run_folder.hpp"
 #include "hal/base/printable_text.hpp"

@@ -1,10 +1,11 @@
-// A design as it comes: surface.json or design.json, STEP or IGES (by the program moldloft-cad), a list of points, a list
-// of template heights, or the folder of an earlier run.
+// A design as it comes: surface.json or design.json, STEP or IGES (by the program moldloft-cad), a list of points, a
+// list of template heights, or the folder of an earlier run.
 //
 // design.json, as moldloft-cad and the simulation write it:
 //
-//     {"format":"moldloft-design","version":1,"unit":"mm","source":{"file":..},
-//      "faces":[{"degree_u":3,"degree_v":3,"knots_u":[..],"knots_v":[..],"control":[[x,y,z],..],"trims":[[[u,v],..],..]}]}
+//     {"format":"moldloft-design","version":1,"unit":"mm","source":{"file":..},"faces":[
+//       {"degree_u":3,"degree_v":3,"knots_u":[..],"knots_v":[..],"control":[[x,y,z],..],"trims":[[[u,v],..],..]}
+//     ]}
 //
 // with the net row by row, u slow and v fast, and the outer loop of the trims first.
 //

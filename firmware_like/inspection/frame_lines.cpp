@@ -102,7 +102,7 @@ FrameAxes frame_axes(const DesignFaces& design) {
   for (const auto& s : design.border()) plan.emplace_back(first.dot(s.at), second.dot(s.at));
   const auto round = geometry::smallest_rectangle(geometry::convex_hull(std::move(plan)));
   axes.x = round.along.x() * first + round.along.y() * second;
-  // A square has no longer side: the one nearer to an axis of the design's frame, and that axis itself where it is meant.
+  // A square has no longer side: the one nearer to an axis of the design's frame, or that axis where it is meant.
   const Vector3d other = axes.up.cross(axes.x);
   if (round.width > square_share * round.length && other.cwiseAbs()[0] > axes.x.cwiseAbs()[0]) axes.x = other;
   Eigen::Index along = 0;

@@ -2,8 +2,8 @@
 //
 // Heights      over the design's base plane, along its up, at pins that stand evenly along the frame
 // Gap          measured less designed height at a pin. Above zero the template is pressed there, below zero it is open
-// Bend         by how much the frame's sagitta falls short of the design's: +3 means bend 3 mm more, -2 is 2 mm too much.
-//              From a parabola through the gaps, so that a frame that only lies higher or leans has none
+// Bend         by how much the frame's sagitta falls short of the design's: +3 means bend 3 mm more, -2 is 2 mm too
+//              much. From a parabola through the gaps: a frame that only lies higher or leans has none
 // Sight mark   by how much the frame leans against the mean of all, over its half length: the plate's twist
 // Units        mm, design frame; curvature 1/m
 // Thread       any; pure

@@ -1,7 +1,7 @@
 // Points of a coordinate measuring machine, or any list of places: XYZ, ASC, CSV, `POINT,X,Y,Z,I,J,K`.
 //
-// Tolerated    commas, semicolons, tabs or blanks between numbers; decimal commas (not together with separating ones);
-//              heads, remarks (#, //, !, %, $), names or numbers before the coordinates; normals or other columns behind
+// Tolerated    commas, semicolons, tabs or blanks between numbers; decimal commas (not with separating ones); heads,
+//              remarks (#, //, !, %, $), names or numbers before the coordinates; normals or other columns behind
 // Units        as a line of the file says ("unit mm", "x [in]"), else nobody knows yet
 // Thread       any; pure
 // Failure      one line: which line, and what is wrong with it

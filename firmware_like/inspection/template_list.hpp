@@ -1,6 +1,6 @@
 // The list of heights for flexible templates, as hull systems print it: a row a frame, signed heights at pins relative
-// to the height at its middle, then the ways from the middle to the seams and to the sight mark; at the bottom the middle
-// points in ship coordinates. The same list comes out again as measured minus nominal, in the shape in which it came in.
+// to the height at its middle, then the ways from the middle to the seams and to the sight mark; at the bottom the
+// middle points in ship coordinates. The same list comes out again as measured minus nominal, in its own shape.
 //
 //     HEIGHTS FOR FLEXIBLE TEMPLATES   PLATE= A-7   DISTANCE BETWEEN COLUMNS= 200
 //     FRAME    -2   -1    0    1    2   LOWER   UPPER   SIGHT   ANGLE

@@ -1,6 +1,6 @@
 #include "firmware_like/report/findings_text.hpp"
 
-#include "firmware_like/report/kit.hpp"
+#include "firmware_like/process/markup.hpp"
 #include "hal/base/printable_text.hpp"
 
 #include <fmt/format.h>

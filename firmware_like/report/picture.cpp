@@ -1,6 +1,6 @@
 #include "firmware_like/report/picture.hpp"
 
-#include "firmware_like/report/kit.hpp"
+#include "firmware_like/process/markup.hpp"
 #include "hal/base/printable_text.hpp"
 
 #include <Eigen/Dense>

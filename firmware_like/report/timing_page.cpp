@@ -1,6 +1,6 @@
 #include "firmware_like/report/timing_page.hpp"
 
-#include "firmware_like/report/kit.hpp"
+#include "firmware_like/process/markup.hpp"
 #include "firmware_like/report/log_plot.hpp"
 #include "firmware_like/results/timing_report.hpp"
 #include "hal/base/printable_text.hpp"

@@ -9,7 +9,8 @@
 // Frame        the plate's, and the motion to the design's; mm, rad
 // Covariance   of the small motion (t, w) after the result, q -> c + exp([w])(q - c) + t about the points' centroid c,
 //              design frame: t in mm first, then w in rad. Points of one group (an exposure) err together by
-//              group_sigma_mm, edges by edge_sigma_mm, so thousands of points do not make a pose a thousand times surer than ten exposures do
+//              group_sigma_mm, edges by edge_sigma_mm, so thousands of points do not make a pose a thousand times
+//              surer than ten exposures do
 // Undetermined a direction in which neither surface nor outline changes is not followed: the pose stays where the start
 //              has it, and the result names it
 // Cost         0.3 us a point and iteration; 5 to 20 iterations

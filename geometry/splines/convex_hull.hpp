@@ -11,8 +11,8 @@ namespace moldloft::geometry {
 // point is needed. Cost O(n log n): Andrew's monotone chain (1979).
 std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points);
 
-// The rectangle of least area round a convex polygon; one of its sides lies on one of the polygon's (Freeman and Shapira
-// 1975). Of a polygon without area the width is 0. Cost O(n^2).
+// The rectangle of least area round a convex polygon; one of its sides lies on one of the polygon's (Freeman and
+// Shapira 1975). Of a polygon without area the width is 0. Cost O(n^2).
 struct PlanRectangle {
   Eigen::Vector2d along = Eigen::Vector2d::UnitX();  // unit vector of the longer side
   double length = 0, width = 0;

@@ -88,8 +88,7 @@ void add_cell_options(CLI::App& command, CellDescription& cell) {
         if (!mistakes) throw CLI::ValidationError("--formed", mistakes.error().what);
         cell.formed = *mistakes;
       },
-      "what it became instead: [SHAPE], springback F, twist T mm, bow B mm, dent D mm at X,Y [radius R], "
-      "...");
+      "what it became: 'wave, springback 0.9, twist 3 mm, dent 5 mm at 9,8'");
   command.parse_complete_callback([&command, &cell] { refuse_contradictions(command, cell); });
 }
 

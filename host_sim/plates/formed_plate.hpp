@@ -41,8 +41,8 @@ std::expected<Mistakes, SimError> mistakes_from(std::string_view text);
 std::expected<std::shared_ptr<const Plate>, SimError> make_formed_plate(std::shared_ptr<const Plate>,
                                                                         const Mistakes&);
 
-// A four-sided plate as a bicubic surface over its outline, through the plate at some thousand places: within 1e-3 mm of
-// formulas, on the corners and the straight sides exactly.
+// A four-sided plate as a bicubic surface over its outline, through the plate at some thousand places: within 1e-3 mm
+// of formulas, on the corners and the straight sides exactly.
 geometry::BSplineSurface spline_of(const Plate&,
                                    const geometry::RigidMotion& placed = geometry::RigidMotion::Identity());
 

@@ -18,7 +18,11 @@ _moldloft() {
   if [ "$word" = "=" ]; then word=""; elif [ "$before" = "=" ]; then before=${COMP_WORDS[COMP_CWORD - 2]}; fi
   case "${program##*/} $command $before" in
     moldloft-sim\ *\ --plate) words="flat cylinder saddle twist dome wave"; compopt -o default 2>/dev/null ;;
+    moldloft-sim\ *\ --design) words="flat cylinder saddle twist dome wave" ;;
     moldloft-sim\ *\ --plates) words="all flat cylinder saddle twist dome wave" ;;
+    *\ inspect\ --outline) words="use ignore" ;;
+    *\ inspect\ --align) words="best robust above below corners datum none" ;;
+    *\ inspect\ --unit) words="mm cm m in ft" ;;
     *\ --outline) words="square rectangle trapezoid parallelogram" ;;
     *\ --outlines) words="all square rectangle trapezoid parallelogram" ;;
     *\ --unit) words="mm m" ;;

@@ -3,7 +3,7 @@
 
 #include "firmware_like/inspection/design_reader.hpp"
 #include "firmware_like/inspection/inspection_files.hpp"
-#include "firmware_like/report/frame_page.hpp"
+#include "firmware_like/inspection/frame_page.hpp"
 #include "hal/temporary_folder.hpp"
 
 #include <doctest/doctest.h>
@@ -92,7 +92,7 @@ TEST_CASE("a plate that is its design differs nowhere, however it lies") {
 }
 
 TEST_CASE(
-    "a dent is where it is and as deep; the plate fails its limit, and a region of its own forgives it") {
+    "a dent is where it is and as deep, the plate fails its limit, and a region of its own forgives it") {
   const auto dented = [](double x, double y) {
     const double left = 1 - (std::pow(x - 80, 2) + std::pow(y - 40, 2)) / 3600;
     return hull(x, y) - (left > 0 ? 4 * left * left * left : 0);
@@ -144,7 +144,7 @@ TEST_CASE("what is another plate, mirrored, in another unit or elsewhere is refu
   };
   auto mirrored = surface_of(hull, 400, 300);
   mirrored.x *= -1;
-  const auto bowl = [](double x, double y) { return -x * x / 8000 - y * y / 5000 + 5 * std::cos(y / 40); };
+  const auto bowl = [](double x, double y) { return 9 * std::cos(x / 45) * std::sin(y / 50); };
   auto none = within(1);
   none.method = AlignmentMethod::none;
   const struct {
@@ -181,7 +181,7 @@ TEST_CASE("a turn that nothing tells apart is said") {
   CHECK(found->design_from_world.isApprox(geometry::RigidMotion::Identity(), 1e-3));
 }
 
-TEST_CASE("one-sided: nowhere below, and it touches; corners and datum lie where they are told") {
+TEST_CASE("one-sided: nowhere below, and it touches, corners and datum lie where they are told") {
   const auto bent = [](double x, double y) { return 1.04 * hull(x, y) + y / 400; };
   const auto run = run_of(surface_of(bent, 400, 300, somewhere()));
   const auto design = design_of(surface_of(hull, 400, 300));
@@ -206,7 +206,7 @@ TEST_CASE("one-sided: nowhere below, and it touches; corners and datum lie where
 }
 
 TEST_CASE(
-    "points in any unit lie on the plate; of another plate, too few to place, or mirrored they are refused") {
+    "points in any unit lie on the plate, of another plate, too few to place, or mirrored they are refused") {
   const auto surface = surface_of(hull, 400, 300);
   const auto run = run_of(surface_of(hull, 400, 300, somewhere()));
   const auto points_of = [&](double factor, double part = 1, double mirror = 1) {
@@ -281,7 +281,7 @@ TEST_CASE("templates: gaps at every pin, bend, twist, and the list comes back as
   CHECK(frame_page(*found).find("bend more") != std::string::npos);
 }
 
-TEST_CASE("design.json and inspection.json say what they hold; odd files are refused") {
+TEST_CASE("design.json and inspection.json say what they hold, odd files are refused") {
   const hal::TemporaryFolder folder;
   const auto surface = surface_of(hull, 400, 300);
   const geometry::DesignFace face{surface, {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}}};

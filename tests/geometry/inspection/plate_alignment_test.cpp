@@ -78,8 +78,10 @@ PlateAlignment best_of(const DesignFaces& design, const Samples& plate, const Ve
   PlateAlignment best;
   double least = 1e30;
   for (const auto& start : alignment_starts(design, plate.edges, up)) {
-    const auto end = align(design, {.points = plate.points, .edges = plate.edges, .point_groups = {}, .edge_groups = {}, .up = up},
-                           {.start = start.design_from_plate, .robust = robust});
+    const auto end =
+        align(design,
+              {.points = plate.points, .edges = plate.edges, .point_groups = {}, .edge_groups = {}, .up = up},
+              {.start = start.design_from_plate, .robust = robust});
     if (!end) continue;
     const double score = std::hypot(end->rms_mm, end->border_rms_mm);
     if (score < least) least = score, best = *end;
@@ -116,14 +118,17 @@ TEST_CASE("a flat sheet does not slide in its own plane: the outline holds it") 
   auto start = motion;
   start.translation() += Vector3d{4, -3, 2};
   const auto found =
-      align(*design, {.points = plate.points, .edges = plate.edges, .point_groups = {}, .edge_groups = {}}, {.start = start});
+      align(*design, {.points = plate.points, .edges = plate.edges, .point_groups = {}, .edge_groups = {}},
+            {.start = start});
   REQUIRE(found);
   CHECK(farthest(found->design_from_plate, motion, plate.points) < 0.2);  // the border is known by samples
   CHECK(found->undetermined.empty());
 
   start = motion;
   start.translation() += Vector3d{0.7, 0, 0};
-  const auto slides = align(*design, {.points = plate.points, .edges = {}, .point_groups = {}, .edge_groups = {}}, {.start = start});
+  const auto slides =
+      align(*design, {.points = plate.points, .edges = {}, .point_groups = {}, .edge_groups = {}},
+            {.start = start});
   REQUIRE(slides);
   CHECK(slides->undetermined.size() == 3);
   CHECK(farthest(slides->design_from_plate, start, plate.points) < 1e-6);
@@ -171,9 +176,9 @@ TEST_CASE("the stated covariance holds: 400 noisy plates, their poses within it 
     for (std::size_t i = 0; i < plate.points.size(); ++i)
       plate.points[i].z() += shots[groups[i]] + 0.05 * unit(draw);
     for (auto& p : plate.edges) p += 0.1 * unit(draw) * Vector3d{std::cos(n), std::sin(n), 0};
-    const auto found =
-        align(*design, {.points = plate.points, .edges = plate.edges, .point_groups = groups, .edge_groups = {}},
-              {.point_sigma_mm = 0.05, .group_sigma_mm = 0.02, .edge_sigma_mm = 0.1 / std::numbers::sqrt2});
+    const auto found = align(
+        *design, {.points = plate.points, .edges = plate.edges, .point_groups = groups, .edge_groups = {}},
+        {.point_sigma_mm = 0.05, .group_sigma_mm = 0.02, .edge_sigma_mm = 0.1 / std::numbers::sqrt2});
     REQUIRE(found);
     Vector6 off;  // of the true pose, the identity
     const Eigen::AngleAxisd turn{found->design_from_plate.linear()};
@@ -198,8 +203,9 @@ TEST_CASE("a mirrored plate does not lie on its design, whichever way it is turn
   double least = 1e30;
   for (const auto& start : alignment_starts(*design, plate.edges, Vector3d::UnitZ())) {
     if (start.upside_down) continue;
-    const auto end = align(*design, {.points = plate.points, .edges = plate.edges, .point_groups = {}, .edge_groups = {}},
-                           {.start = start.design_from_plate});
+    const auto end =
+        align(*design, {.points = plate.points, .edges = plate.edges, .point_groups = {}, .edge_groups = {}},
+              {.start = start.design_from_plate});
     if (end) least = std::min(least, std::hypot(end->rms_mm, end->border_rms_mm));
   }
   CHECK(least > 1);
@@ -234,10 +240,13 @@ TEST_CASE("what cannot be aligned says why") {
   REQUIRE(design);
   auto plate = samples_of(surface, RigidMotion::Identity(), 4);
   CHECK(
-      align(*design, {.points = std::span{plate.points}.first(5), .edges = {}, .point_groups = {}, .edge_groups = {}}).error().error ==
-      Error::too_few_points);
+      align(*design,
+            {.points = std::span{plate.points}.first(5), .edges = {}, .point_groups = {}, .edge_groups = {}})
+          .error()
+          .error == Error::too_few_points);
   plate.points[3].y() = NAN;
-  const auto lost = align(*design, {.points = plate.points, .edges = {}, .point_groups = {}, .edge_groups = {}});
+  const auto lost =
+      align(*design, {.points = plate.points, .edges = {}, .point_groups = {}, .edge_groups = {}});
   REQUIRE_FALSE(lost);
   CHECK(lost.error() == Flaw{Error::not_finite, 3});
   CHECK_FALSE(DesignFaces::from({}));

@@ -1,5 +1,5 @@
-// Sixty plates with known mistakes, measured by the simulated cell and inspected: deviations, poses and verdicts against
-// what the formulas say.
+// Sixty plates with known mistakes, measured by the simulated cell and inspected: deviations, poses and verdicts
+// against what the formulas say.
 #include "firmware_like/inspection/inspection.hpp"
 #include "hal/temporary_folder.hpp"
 #include "host_sim/runs/simulated_run.hpp"

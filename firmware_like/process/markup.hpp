@@ -1,4 +1,4 @@
-// What the pages, tables and pictures of a run share.
+// Text as HTML and SVG take it.
 //
 // Thread       any; pure
 // Allocation   yes

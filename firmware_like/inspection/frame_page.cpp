@@ -1,6 +1,6 @@
-#include "firmware_like/report/frame_page.hpp"
+#include "firmware_like/inspection/frame_page.hpp"
 
-#include "firmware_like/report/kit.hpp"
+#include "firmware_like/process/markup.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "firmware_like/report/kit.hpp"
+#include "firmware_like/process/markup.hpp"
 
 #include "hal/base/printable_text.hpp"
 
