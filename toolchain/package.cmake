@@ -4,7 +4,8 @@
 #     (cd build/release && cpack)             # the last step alone; before it: cmake --build --preset release --target packaged
 #
 # Component `controller` is the package moldloft, for the cell's computer; `simulation` is moldloft-sim, simulated devices for a
-# rehearsal there; `geometry` is libmoldloft-geometry-dev, for programs of others (install.cmake).
+# rehearsal there; `geometry` is libmoldloft-geometry-dev, for programs of others (install.cmake); `cad` is moldloft-cad, which
+# reads CAD files and is made where OpenCASCADE is installed.
 #
 # Included at the end of the top CMakeLists.txt.
 set(package ${PROJECT_SOURCE_DIR}/toolchain/package)
@@ -39,6 +40,12 @@ install(TARGETS moldloft-sim RUNTIME DESTINATION bin COMPONENT simulation)
 install(TARGETS pty_modem LIBRARY DESTINATION lib/moldloft COMPONENT simulation)
 install(PROGRAMS ${package}/moldloft-rehearse DESTINATION bin COMPONENT simulation)
 
+if(TARGET moldloft-cad)
+  add_dependencies(packaged moldloft-cad)
+  install(TARGETS moldloft-cad RUNTIME DESTINATION bin COMPONENT cad)
+  install(FILES ${package}/moldloft.bash RENAME moldloft-cad DESTINATION ${completions} COMPONENT cad)
+endif()
+
 # gzip as the distribution's own pages are, without a date; made when CMake configures.
 file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/package)
 function(install_compressed file name destination component)
@@ -51,6 +58,11 @@ foreach(page ${pages})
   set(component controller)
   if(page MATCHES "sim|rehearse")
     set(component simulation)
+  elseif(page MATCHES "cad")
+    if(NOT TARGET moldloft-cad)
+      continue()
+    endif()
+    set(component cad)
   endif()
   install_compressed(${package}/${page} ${page}.gz ${manuals} ${component})
 endforeach()
@@ -58,7 +70,12 @@ endforeach()
 set(packages_controller moldloft)
 set(packages_simulation moldloft-sim)
 set(packages_geometry libmoldloft-geometry-dev)
-foreach(component controller simulation geometry)
+set(packages_cad moldloft-cad)
+set(components controller simulation geometry)
+if(TARGET moldloft-cad)
+  list(APPEND components cad)
+endif()
+foreach(component ${components})
   install_compressed(${package}/changelog changelog.gz ${documents}/${packages_${component}} ${component})
   install(FILES ${package}/copyright DESTINATION ${documents}/${packages_${component}} COMPONENT ${component})
 endforeach()
@@ -69,7 +86,7 @@ set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_PACKAGE_CONTACT "Moldloft developers <moldloft@packages.invalid>")  # dpkg wants an address, and there is none to give
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
-set(CPACK_COMPONENTS_ALL controller simulation geometry)
+set(CPACK_COMPONENTS_ALL ${components})
 # The rights of folders are the packages' own, whatever the umask of who builds them.
 set(CPACK_PRE_BUILD_SCRIPTS ${package}/rights.cmake)
 # Refuses what would come out wrong without a word, and dates the packages by the changelog.
@@ -86,7 +103,7 @@ set(CPACK_DEBIAN_CONTROLLER_PACKAGE_NAME moldloft)
 set(CPACK_DEBIAN_CONTROLLER_PACKAGE_SECTION science)
 # systemd-sysusers makes the user, udevadm is asked to read the rule; on a machine without systemd neither is missed.
 set(CPACK_DEBIAN_CONTROLLER_PACKAGE_RECOMMENDS "systemd")
-set(CPACK_DEBIAN_CONTROLLER_PACKAGE_SUGGESTS "moldloft-sim")
+set(CPACK_DEBIAN_CONTROLLER_PACKAGE_SUGGESTS "moldloft-sim, moldloft-cad")
 set(CPACK_COMPONENT_CONTROLLER_DESCRIPTION
 "controller of a cell that measures formed ship plates
 A robot carries a laser-stripe scanner to a plate, finds its edge, walks
@@ -108,6 +125,16 @@ Simulated devices for a rehearsal on the computer of the cell: a scanner
 on loopback TCP and a robot on a pseudo-terminal, served in real time to
 the installed controller. moldloft-rehearse measures one simulated plate
 and says how far the result is from the truth.")
+
+set(CPACK_DEBIAN_CAD_PACKAGE_NAME moldloft-cad)
+set(CPACK_DEBIAN_CAD_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_CAD_PACKAGE_DEPENDS "moldloft (= ${PROJECT_VERSION})")
+set(CPACK_COMPONENT_CAD_DESCRIPTION
+"designs of plates from STEP and IGES files, for moldloft
+Reads the B-spline faces of CAD files, trimmed or not, for the command
+moldloft inspect, which compares a measured plate with its design. It is a
+package of its own because it needs OpenCASCADE, which is larger than all
+the rest.")
 
 set(CPACK_DEBIAN_GEOMETRY_PACKAGE_NAME libmoldloft-geometry-dev)
 set(CPACK_DEBIAN_GEOMETRY_PACKAGE_SECTION libdevel)

@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <fcntl.h>
 #include <fstream>
 #include <iterator>
 #include <spawn.h>
@@ -135,30 +137,56 @@ std::string cad_program() {
   return !failed && fs::exists(beside, failed) ? beside.string() : "moldloft-cad";
 }
 
+struct Ended {
+  bool started = false;
+  int status = 0;
+  std::string words;  // its line on standard error
+};
+
+// Its answer is not ours to show, its complaint is ours to tell.
+Ended run_program(std::vector<std::string> words, const fs::path& complaint) {
+  std::vector<char*> arguments;
+  for (auto& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addopen(&files, STDERR_FILENO, complaint.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
+                                   0600);
+  pid_t child = 0;
+  Ended ended;
+  ended.started = posix_spawnp(&child, arguments[0], &files, nullptr, arguments.data(), environ) == 0;
+  posix_spawn_file_actions_destroy(&files);
+  if (!ended.started) return ended;
+  while (waitpid(child, &ended.status, 0) < 0 && errno == EINTR) {
+  }
+  std::ifstream in{complaint};
+  std::getline(in, ended.words);
+  if (ended.words.starts_with("moldloft-cad: "))
+    ended.words.erase(0, std::string_view{"moldloft-cad: "}.size());
+  return ended;
+}
+
 std::expected<Design, Failure> read_cad(const fs::path& path) {
-  const std::string program = cad_program();
   std::string folder = (fs::temp_directory_path() / "moldloft-design-XXXXXX").string();
   if (mkdtemp(folder.data()) == nullptr)
     return refuse(path, "no folder for its conversion can be made under the temporary files");
   const fs::path out = fs::path{folder} / "design.json";
-  const std::string file = path.string(), to = out.string();
-  std::vector<std::string> words{program, "import", file, "--out", to};
-  std::vector<char*> arguments;
-  for (auto& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  pid_t child = 0;
-  const int failed = posix_spawnp(&child, program.c_str(), nullptr, nullptr, arguments.data(), environ);
-  int status = 0;
-  if (failed == 0) waitpid(child, &status, 0);
-  const bool missing = failed != 0 || (WIFEXITED(status) && WEXITSTATUS(status) == 127);
-  auto design =
-      missing ? std::expected<Design, Failure>{refuse(
-                    path,
-                    "CAD files are read by moldloft-cad, which is not installed: install the package "
-                    "moldloft-cad, or export the surface as points")}
-      : status != 0
-          ? std::expected<Design, Failure>{refuse(path, "moldloft-cad could not read it (see above)")}
-          : read_json_design(out);
+  const auto ended = run_program({cad_program(), "import", path.string(), "--out", out.string()},
+                                 fs::path{folder} / "words");
+  const bool missing = !ended.started || (WIFEXITED(ended.status) && WEXITSTATUS(ended.status) == 127);
+  std::expected<Design, Failure> design;
+  if (missing) {
+    design = refuse(
+        path,
+        "CAD files are read by moldloft-cad, which is not installed: install the package moldloft-cad, or "
+        "export the surface as points");
+  } else if (ended.status != 0) {
+    design = ended.words.empty() ? refuse(path, "moldloft-cad ended without a word, and read nothing")
+                                 : std::unexpected(Failure{ended.words});
+  } else {
+    design = read_json_design(out);
+  }
   std::error_code ignored;
   fs::remove_all(folder, ignored);
   if (design) design->file = path.string(), design->name = path.stem().string();

@@ -11,7 +11,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int samples_a_side = 160;    // of the border of a rectangle of knots
+constexpr int samples_a_loop = 640;    // of the border
 constexpr int area_grid = 24;          // per side, for area, mean normal and centroid
 constexpr double domain_slack = 1e-9;  // of the domain's length: what a writer's rounding may leave
 
@@ -79,13 +79,20 @@ void add_samples(const PreparedSurface& surface, const Vector2d& a, const Vector
   }
 }
 
+// Chords of a loop get samples by their share of it, and at least two: a trim may have four corners or a thousand.
 std::vector<BorderSample> border_of(const PreparedSurface& surface, std::span<const TrimPolygon> loops) {
   std::vector<BorderSample> border;
-  const bool natural = loops.size() == 1 && loops[0].size() == 4;
   for (const auto& loop : loops) {
+    std::vector<double> lengths;
+    double all = 0;
     for (std::size_t i = 0; i < loop.size(); ++i) {
       const Vector2d &a = loop[i], &b = loop[(i + 1) % loop.size()];
-      add_samples(surface, a, b, natural ? samples_a_side : 2, border);
+      lengths.push_back((surface.at(b.x(), b.y()).value - surface.at(a.x(), a.y()).value).norm());
+      all += lengths.back();
+    }
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      const int share = static_cast<int>(std::lround(samples_a_loop * lengths[i] / std::max(all, 1e-300)));
+      add_samples(surface, loop[i], loop[(i + 1) % loop.size()], std::max(2, share), border);
     }
   }
   return border;

@@ -1,9 +1,8 @@
 #include "host_sim/plates/formed_plate.hpp"
 
-#include "geometry/splines/bspline_basis.hpp"
+#include "geometry/fit/greville.hpp"
 #include "host_sim/base/plan_polygon.hpp"
 
-#include <Eigen/LU>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -77,9 +76,7 @@ class MistakenPlate final : public Plate {
   Vector2d middle_, half_;
 };
 
-std::unexpected<SimError> refuse(std::string what) {
-  return std::unexpected(SimError{std::move(what)});
-}
+std::unexpected<SimError> refuse(std::string what) { return std::unexpected(SimError{std::move(what)}); }
 
 // The words of one mistake, blanks and commas inside a place taken for one.
 std::vector<std::string> words_of(std::string_view part) {
@@ -217,42 +214,21 @@ std::expected<std::shared_ptr<const Plate>, SimError> make_formed_plate(std::sha
 
 geometry::BSplineSurface spline_of(const Plate& plate, const geometry::RigidMotion& placed) {
   constexpr int count = spline_points;
-  geometry::BSplineSurface s;
-  const auto knot = [](int i) { return std::clamp((i - 3) / static_cast<double>(count - 3), 0.0, 1.0); };
-  for (auto* knots : {&s.knots_u, &s.knots_v}) {
-    for (int i = 0; i < count + 4; ++i) knots->push_back(knot(i));
-  }
-  // The spline that takes the formula's heights at the Greville places; x and y are bilinear and so lie in its space.
-  const auto greville = [&](int i) { return (knot(i + 1) + knot(i + 2) + knot(i + 3)) / 3; };
-  Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(count, count);
-  for (int i = 0; i < count; ++i) {
-    for (int k = 0; k < count; ++k) {
-      geometry::HeightCurve one{
-          s.knots_u, std::vector<geometry::HeightCurve::Point>(static_cast<std::size_t>(count),
-                                                               geometry::HeightCurve::Point::Zero())};
-      one.control[static_cast<std::size_t>(k)][0] = 1;
-      basis(i, k) = one.value(greville(i))[0];
-    }
-  }
-  for (auto* net : {&s.x, &s.y, &s.z}) net->resize(count, count);
+  std::vector<double> knots;
+  for (int i = 0; i < count + 4; ++i)
+    knots.push_back(std::clamp((i - 3) / static_cast<double>(count - 3), 0.0, 1.0));
+  const auto places = geometry::greville_places(knots);
+  Eigen::MatrixXd x(count, count), y = x, z = x;
   const auto& c = plate.corners();
   for (int i = 0; i < count; ++i) {
     for (int k = 0; k < count; ++k) {
-      const double u = greville(i), v = greville(k);
+      const double u = places[static_cast<std::size_t>(i)], v = places[static_cast<std::size_t>(k)];
       const Vector2d p = (1 - v) * ((1 - u) * c[0] + u * c[1]) + v * ((1 - u) * c[3] + u * c[2]);
-      s.x(i, k) = p.x(), s.y(i, k) = p.y(), s.z(i, k) = plate.height(p.x(), p.y());
+      const Eigen::Vector3d at = placed * Eigen::Vector3d{p.x(), p.y(), plate.height(p.x(), p.y())};
+      x(i, k) = at.x(), y(i, k) = at.y(), z(i, k) = at.z();
     }
   }
-  const Eigen::PartialPivLU<Eigen::MatrixXd> solver{basis};
-  const Eigen::MatrixXd along_u = solver.solve(s.z);
-  s.z = solver.solve(along_u.transpose()).transpose();
-  for (int i = 0; i < count; ++i) {
-    for (int k = 0; k < count; ++k) {
-      const Eigen::Vector3d p = placed * Eigen::Vector3d{s.x(i, k), s.y(i, k), s.z(i, k)};
-      s.x(i, k) = p.x(), s.y(i, k) = p.y(), s.z(i, k) = p.z();
-    }
-  }
-  return s;
+  return geometry::surface_through(knots, knots, x, y, z);
 }
 
 }  // namespace moldloft::host_sim

@@ -94,7 +94,8 @@ def offers(words, *wanted, exactly=True):
         wrong.append(f"completion of {' '.join(words)!r}: {sorted(got)}, wanted {sorted(wanted)}")
 
 
-for program in ("moldloft", "moldloft-sim"):
+# moldloft-cad is built where OpenCASCADE is.
+for program in [name for name in ("moldloft", "moldloft-sim", "moldloft-cad") if os.path.exists(os.path.join(binaries, name))]:
     for command in check_page(program):
         offers([program, command[:-1]], command, exactly=False)
         text = said(program, command)

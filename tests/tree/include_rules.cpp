@@ -63,6 +63,11 @@ const Arrows* arrows_for(std::string_view path) {
 }
 
 std::string library_finding(std::string_view path, std::string_view room, std::string_view name) {
+  // OpenCASCADE names its headers by their ending alone: the program that reads CAD files has them, and nothing else.
+  if (name.ends_with(".hxx"))
+    return path.starts_with("firmware_like/cad/") && !is_header(path)
+               ? ""
+               : "<" + std::string{name} + "> is OpenCASCADE's: that belongs into a .cpp of firmware_like/cad";
   for (const auto& library : libraries) {
     if (!name.starts_with(library.prefix)) continue;
     if (!contains(library.rooms, room))

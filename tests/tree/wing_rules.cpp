@@ -60,7 +60,7 @@ std::size_t floor_of(std::span<const Wing> wings, const Wing& wing, std::set<std
 }  // namespace
 
 std::vector<Wing> wings_in(std::string_view cmake_text) {
-  static const std::regex declared{R"(^moldloft_wing\((\w+)\s+(\w+)([^)]*)\))", std::regex::multiline};
+  static const std::regex declared{R"(^ *moldloft_wing\((\w+)\s+(\w+)([^)]*)\))", std::regex::multiline};
   const std::string text{cmake_text};
   std::vector<Wing> wings;
   for (std::sregex_iterator it{text.begin(), text.end(), declared}, end; it != end; ++it) {

@@ -45,4 +45,4 @@ _moldloft() {
   return 0
 }
 
-complete -o filenames -F _moldloft moldloft moldloft-sim
+complete -o filenames -F _moldloft moldloft moldloft-sim moldloft-cad
