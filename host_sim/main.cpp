@@ -15,6 +15,7 @@
 #include "host_sim/runs/device_host.hpp"
 #include "host_sim/runs/hard_campaign.hpp"
 #include "host_sim/runs/judge.hpp"
+#include "host_sim/runs/passes.hpp"
 #include "host_sim/runs/simulated_run.hpp"
 
 #include <CLI/CLI.hpp>
@@ -143,6 +144,16 @@ void add_campaign_command(CLI::App& app, CampaignOptions& options) {
   command->add_flag("--json", options.json, "an array of objects instead of the table");
 }
 
+void add_passes_command(CLI::App& app, PassesOptions& options) {
+  auto* command =
+      app.add_subcommand("passes", "a plate formed step by step, each pass measured and inspected");
+  add_cell_options(*command, options.cell);
+  add_number_with_default(*command, "--passes", options.passes, {1, 50}, "how many");
+  add_number_with_default(*command, "--limit", options.limit_mm, {0.001, 1000.0, "mm"},
+                          "what may differ, mm");
+  command->add_option("--out", options.out, "a folder for the passes")->required();
+}
+
 void add_day_command(CLI::App& app, DayOptions& options) {
   auto* command =
       app.add_subcommand("day", "plate after plate in virtual time, and what must not grow meanwhile");
@@ -207,6 +218,8 @@ int run_command_line(int argc, char** argv) {
   CampaignOptions campaign;
   add_campaign_command(app, campaign);
 
+  PassesOptions passes;
+  add_passes_command(app, passes);
   DayOptions day;
   add_day_command(app, day);
 
@@ -220,6 +233,7 @@ int run_command_line(int argc, char** argv) {
   if (devices_command->parsed()) return run_devices(devices);
   if (app.got_subcommand("cell")) return cell_command(run, quiet);
   if (app.got_subcommand("campaign")) return run_campaign(campaign);
+  if (app.got_subcommand("passes")) return show_passes(passes);
   if (app.got_subcommand("day")) return show_day(day);
   return judge_command(folder, judged);
 }

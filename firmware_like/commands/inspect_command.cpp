@@ -1,6 +1,7 @@
 #include "firmware_like/commands/inspect_command.hpp"
 
 #include "firmware_like/inspection/design_reader.hpp"
+#include "firmware_like/inspection/frame_page.hpp"
 #include "firmware_like/inspection/inspection.hpp"
 #include "firmware_like/inspection/inspection_files.hpp"
 #include "firmware_like/inspection/point_list.hpp"
@@ -8,13 +9,13 @@
 #include "firmware_like/process/complaint.hpp"
 #include "firmware_like/process/console.hpp"
 #include "firmware_like/process/whole_file.hpp"
-#include "firmware_like/inspection/frame_page.hpp"
 #include "firmware_like/results/stored_result.hpp"
 #include "firmware_like/run/run_folder.hpp"
 #include "hal/base/printable_text.hpp"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 
@@ -130,12 +131,24 @@ std::expected<InspectionSettings, Failure> settings_of(const InspectOptions& opt
   return settings;
 }
 
-// A run whose shots are gone still has its surface; the map needs no more.
-std::vector<MeasuredPoint> points_of(const fs::path& folder, const RunResult& result) {
+// The single points of the run's store, and what its configuration promises. A run whose shots are gone still has its
+// surface, and the map needs no more: what could not be read is said, and nothing is refused.
+std::vector<MeasuredPoint> points_of(const fs::path& folder, RunResult& result,
+                                     std::vector<std::string>& remarks) {
+  const auto without = [&](std::string_view why) {
+    remarks.push_back(fmt::format("single points are left out: {}", why));
+    return std::vector<MeasuredPoint>{};
+  };
   const auto run = open_run(folder);
-  if (!run || !run->store) return {};
+  if (!run) return without(run.error().what);
+  const auto text = run->store->meta("config");
+  if (!text) return without(text.error().what);
+  const auto config = parse_config(*text, folder.string() + "/run.db");
+  if (!config) return without(config.error().what);
+  result.tip_from_scanner = config->scanner.tip_from_scanner;
+  result.promised = promise_of(*config);
   auto points = measured_points(result, *run->store, single_points, gate_mm);
-  return points ? std::move(*points) : std::vector<MeasuredPoint>{};
+  return points ? std::move(*points) : without(points.error().what);
 }
 
 std::expected<void, Failure> write_all(const fs::path& folder, const Inspection& found,
@@ -158,7 +171,7 @@ std::expected<int, Failure> inspected(const InspectOptions& options) {
   const auto settings = settings_of(options);
   if (!settings) return std::unexpected(settings.error());
   const fs::path run{options.run};
-  const auto result = read_result(run);
+  auto result = read_result(run);
   if (!result) return std::unexpected(result.error());
   if (!result->measured)
     return refuse(fmt::format("{}: that run is {} and has no surface: measure the plate to its end",
@@ -168,11 +181,12 @@ std::expected<int, Failure> inspected(const InspectOptions& options) {
                               to_string(result->outcome), result->message));
   const auto design = read_design(options.design, options.unit);
   if (!design) return std::unexpected(design.error());
-  auto found =
-      inspect(*result, design->faces.empty() ? std::vector<MeasuredPoint>{} : points_of(run, *result),
-              *design, *settings);
+  std::vector<std::string> remarks;
+  const auto points = points_of(run, *result, remarks);
+  auto found = inspect(*result, points, *design, *settings);
   if (!found) return std::unexpected(found.error());
   found->run = options.run;
+  if (!design->faces.empty()) std::ranges::move(remarks, std::back_inserter(found->remarks));
   if (result->outcome == Outcome::warned)
     found->remarks.push_back("the measurement has warnings: moldloft report shows them");
   const fs::path out = options.out.empty() ? run : fs::path{options.out};

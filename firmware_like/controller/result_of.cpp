@@ -79,10 +79,7 @@ RunResult result_of(const Controller& c, const RunLabel& label, const RunConditi
   r.measured = measured_by(c);
   r.track = track_of(c);
   r.tip_from_scanner = c.config().scanner.tip_from_scanner;
-  r.promised = {.noise_mm = c.config().scanner.noise_mm,
-                .repeatability_z_mm = c.config().robot.repeatability_z_mm,
-                .finest_span_mm = c.config().finest_span_mm,
-                .largest_unseen = c.config().unseen_percent / 100};
+  r.promised = promise_of(c.config());
   r.evidence = cell.evidence();
   r.cycle = shares_of(cell.cycle());
   r.memory = c.memory();

@@ -33,4 +33,11 @@ std::optional<Outcome> outcome_named(std::string_view word) {
   return row == outcomes.end() ? std::nullopt : std::optional{row->outcome};
 }
 
+Promise promise_of(const CellConfig& config) {
+  return {.noise_mm = config.scanner.noise_mm,
+          .repeatability_z_mm = config.robot.repeatability_z_mm,
+          .finest_span_mm = config.finest_span_mm,
+          .largest_unseen = config.unseen_percent / 100};
+}
+
 }  // namespace moldloft::firmware_like

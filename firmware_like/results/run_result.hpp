@@ -6,6 +6,7 @@
 // Thread       any: it owns all that it holds
 #pragma once
 
+#include "firmware_like/config/config.hpp"
 #include "firmware_like/config/memory_plan.hpp"
 #include "firmware_like/process/json_text.hpp"
 #include "firmware_like/results/finding.hpp"
@@ -78,6 +79,8 @@ struct Promise {
   double finest_span_mm = 10;
   double largest_unseen = 0.02;  // share of the plate's area without points beyond which it is not measured
 };
+
+Promise promise_of(const CellConfig&);
 
 struct CycleShares {
   double seconds = 0, idle_fraction = 0, standing_fraction = 0;
