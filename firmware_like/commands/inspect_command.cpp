@@ -9,6 +9,7 @@
 #include "firmware_like/process/complaint.hpp"
 #include "firmware_like/process/console.hpp"
 #include "firmware_like/process/whole_file.hpp"
+#include "firmware_like/report/measurement_page.hpp"
 #include "firmware_like/results/stored_result.hpp"
 #include "firmware_like/run/run_folder.hpp"
 #include "hal/base/printable_text.hpp"
@@ -191,6 +192,9 @@ std::expected<int, Failure> inspected(const InspectOptions& options) {
     found->remarks.push_back("the measurement has warnings: moldloft report shows them");
   const fs::path out = options.out.empty() ? run : fs::path{options.out};
   if (auto written = write_all(out, *found, *design); !written) return std::unexpected(written.error());
+  if (options.out.empty()) {
+    if (auto written = write_report(run); !written) return std::unexpected(written.error());
+  }
   show(fmt::format("{}\nfiles                       {}\n", inspection_table(*found),
                    hal::printable((out / "inspection.json").string() +
                                   ", deviations.csv, deviations.ply, frames.txt, frames.html")));

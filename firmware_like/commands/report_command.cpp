@@ -4,12 +4,11 @@
 #include "firmware_like/process/console.hpp"
 #include "firmware_like/process/json_file.hpp"
 #include "firmware_like/process/whole_file.hpp"
-#include "firmware_like/report/findings_text.hpp"
+#include "firmware_like/report/measurement_page.hpp"
 #include "firmware_like/report/result_table.hpp"
 #include "firmware_like/report/timing_page.hpp"
 #include "firmware_like/report/timing_table.hpp"
 #include "firmware_like/results/stored_result.hpp"
-#include "firmware_like/results/summary.hpp"
 #include "hal/base/printable_text.hpp"
 
 #include <fmt/format.h>
@@ -29,8 +28,6 @@ int report_run(const ReportOptions& options) {
       const auto result = read_result(folder);
       if (!result) return refuse(result.error().what);
       text = result_table(*result, options.run) + "\n" + timing_table(result->timing);
-      page = timing_page(result->timing, "Timing of " + result->label.plate, about_run(*result),
-                         findings_section(*result));
     } else {  // of the self-test, which measures no plate
       const auto timing = read_json(folder / "timing.json");
       if (!timing) return refuse(timing.error().what);
@@ -40,8 +37,8 @@ int report_run(const ReportOptions& options) {
   } catch (const Json::exception& e) {
     return refuse(fmt::format("{}: was not written by this version of moldloft ({})", options.run, e.what()));
   }
-  if (const auto written = write_file(folder / "report.html", page); !written)
-    return refuse(written.error().what);
+  const auto written = page.empty() ? write_report(folder) : write_file(folder / "report.html", page);
+  if (!written) return refuse(written.error().what);
   show(fmt::format("{}\nreport                      {}\n", text,
                    hal::printable((folder / "report.html").string())));
   return exit_done;

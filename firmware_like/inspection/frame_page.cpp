@@ -36,7 +36,9 @@ svg text{font:13px system-ui,"Segoe UI",sans-serif;fill:#10151c}.soft{fill:var(-
 @media (max-width:520px){h1{font-size:24px}.verdict{font-size:20px}td.name{font-size:22px}td.figure{font-size:28px}
 td.words{font-size:19px}td.small{font-size:14px}.slim{display:none}}
 @page{size:A4;margin:12mm}
-@media print{main{max-width:none;padding:0}*{print-color-adjust:exact;-webkit-print-color-adjust:exact}
+@media print{main{max-width:none;padding:0}svg{max-height:80mm}
+td.name{font-size:28px}td.figure{font-size:38px}td.words{font-size:27px}
+*{print-color-adjust:exact;-webkit-print-color-adjust:exact}
 tr,svg{break-inside:avoid}}
 )";
 
@@ -130,8 +132,8 @@ std::string hair_diagram(const std::vector<FrameLine>& lines, double width_px) {
       hairs += fmt::format("M{:.1f} {:.1f}V{:.1f}", x, base, tip);
       svg += fmt::format(
           "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\" class=\"soft\" "
-          "font-size=\"10\">{:+.1f}</text>",
-          x, *gap >= 0 ? base + 13 : base - 5, *gap);
+          "font-size=\"10\">{}</text>",
+          x, *gap >= 0 ? base + 13 : base - 5, std::abs(*gap) < 0.05 ? "0" : fmt::format("{:+.1f}", *gap));
     }
     svg += fmt::format(
         "<polyline points=\"{}\" fill=\"none\" stroke=\"#10151c\" stroke-width=\"1.2\"/><path d=\"{}\" "

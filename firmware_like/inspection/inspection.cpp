@@ -60,9 +60,12 @@ double sigma_at(const geometry::PlateAlignment& a, const RunResult& result, cons
   row << normal, (at - a.centroid).cross(normal);
   double square = std::pow(result.promised.repeatability_z_mm, 2) + row.dot(a.covariance * row);
   const auto& fit = result.measured->fit;
+  // A stored result knows its spans by its surface.
+  const int spans_u = result.measured->surface.control_u() - 3,
+            spans_v = result.measured->surface.control_v() - 3;
   for (int corner = 0; corner < 4; ++corner) {
     const double from_u = corner == 0 || corner == 3 ? u : 1 - u, from_v = corner < 2 ? v : 1 - v;
-    const double part = std::max(0.0, 1 - from_u * fit.spans_u) * std::max(0.0, 1 - from_v * fit.spans_v);
+    const double part = std::max(0.0, 1 - from_u * spans_u) * std::max(0.0, 1 - from_v * spans_v);
     square += std::pow(part * fit.corner_sigma_mm[static_cast<std::size_t>(corner)], 2);
   }
   return std::sqrt(square);

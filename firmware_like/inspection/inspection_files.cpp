@@ -122,6 +122,14 @@ Json inspection_json(const Inspection& i) {
   for (const auto& w : i.worst) out["worst"].push_back(place_json(w));
   out["histogram"] = Json::array();
   for (const auto& b : i.histogram) out["histogram"].push_back({b.from_mm, b.to_mm, b.count});
+  if (i.map_u > 0) {
+    Json values = Json::array();
+    for (const auto& p : i.places) values.push_back(p.beyond ? Json() : Json(std::round(p.mm * 1e4) / 1e4));
+    out["map"] = {{"of", "the measured surface's (u, v), rows along u"},
+                  {"rows", i.map_u},
+                  {"columns", i.map_v},
+                  {"mm", values}};
+  }
   out["twist_mm"] = i.twist_mm;
   out["frames"] = Json::array();
   for (const auto& f : i.frame_lines) out["frames"].push_back(frame_json(f));

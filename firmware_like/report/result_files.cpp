@@ -1,9 +1,8 @@
 #include "firmware_like/report/result_files.hpp"
 
 #include "firmware_like/process/whole_file.hpp"
-#include "firmware_like/report/findings_text.hpp"
+#include "firmware_like/report/measurement_page.hpp"
 #include "firmware_like/report/picture.hpp"
-#include "firmware_like/report/timing_page.hpp"
 #include "firmware_like/results/cad_files.hpp"
 #include "firmware_like/results/measured_points.hpp"
 #include "firmware_like/results/ply_writer.hpp"
@@ -98,6 +97,11 @@ std::expected<void, Failure> write_results(const RunResult& r, const RunFolder& 
     auto written = write_file(folder.path / name, content);
     if (result) result = std::move(written);
   };
+  // What was compared with a design was the surface before this one.
+  std::error_code ignored;
+  for (const char* file :
+       {"inspection.json", "frames.txt", "frames.html", "deviations.csv", "deviations.ply"})
+    std::filesystem::remove(folder.path / file, ignored);
   std::vector<PlateField> fields;
   if (r.measured) {
     auto of_surface = write_surface(r, folder, error_field, write);
@@ -108,10 +112,10 @@ std::expected<void, Failure> write_results(const RunResult& r, const RunFolder& 
   if (!events) return std::unexpected{Failure{events.error().what}};
   write("events.jsonl", events_jsonl(*events));
   write("track.json", json_text(track_json(r)) + "\n");
-  write("overview.svg", picture(r, std::move(fields)));
+  const std::string overview = picture(r, std::move(fields));
+  write("overview.svg", overview);
   write("timing.json", json_text(r.timing, 2) + "\n");
-  write("report.html",
-        timing_page(r.timing, "Timing of " + r.label.plate, about_run(r), findings_section(r)));
+  write("report.html", measurement_page(r, overview, {}));
   write("summary.json", json_text(summary_json(r), 2) + "\n");
   return result;
 }

@@ -35,7 +35,8 @@ th,td{padding:3px 8px;border-bottom:1px solid var(--line);text-align:right;white
 th{color:var(--soft);font-weight:600}th:first-child,td:first-child,.words td,.words th,th.word,td.word{text-align:left}
 .words td{white-space:normal;vertical-align:top}.words td:first-child{white-space:nowrap}
 .bad{color:var(--bad);font-weight:600}.good{color:var(--good)}
-svg{width:100%;height:auto;display:block}.grid{stroke:var(--line)}.fine{stroke:var(--fine)}
+svg,img{width:100%;height:auto;display:block}figure{margin:14px 0}
+figure img{border-radius:6px;max-width:620px;margin:auto}.grid{stroke:var(--line)}.fine{stroke:var(--fine)}
 .tick{fill:var(--soft);font:12px system-ui,"Segoe UI",sans-serif}
 .s0{fill:var(--ours);fill-opacity:.35;stroke:var(--ours);stroke-width:1.4}
 .s1{fill:none;stroke:var(--theirs);stroke-width:1.8}
@@ -118,10 +119,11 @@ std::string in_us(const Json& h, const char* key) {
 
 std::string head(const Json& t, std::string_view title, std::string_view about, std::string_view first) {
   const bool yes = t.value("representative", false);
-  std::string html = fmt::format("<h1>{}</h1>\n<p class=\"soft\">{} ticks of {} us</p>\n", escaped(title),
-                                 figure(t, "ticks"), figure(t, "tick_us"));
+  std::string html = fmt::format("<h1>{}</h1>\n", escaped(title));
   if (!about.empty()) html += fmt::format("<p class=\"soft\">{}</p>\n", escaped(about));
   html += first;
+  if (!first.empty()) html += "<h2 id=\"timing\">Timing</h2>\n";
+  html += fmt::format("<p class=\"soft\">{} ticks of {} us</p>\n", figure(t, "ticks"), figure(t, "tick_us"));
   html += yes ? std::string{"<div class=\"verdict yes\"><b>Representative.</b> The machine was set up as it is meant "
                             "to be; the figures say what this cell does.</div>\n"}
               : fmt::format("<div class=\"verdict no\"><b>Not representative:</b> {}.</div>\n",

@@ -1,5 +1,5 @@
-// report.html: timing.json as one page to look at and to print. Nothing is loaded from anywhere: the style stands in
-// it, the histograms are inline SVG, and there is no script. It follows the reader's light or dark setting.
+// timing.json as a page, or the last part of one, to look at and to print. Nothing is loaded: the style stands in it,
+// the histograms are inline SVG, and there is no script. It follows the reader's light or dark setting.
 //
 // Thread       any
 // Allocation   yes

@@ -28,6 +28,11 @@ fs::path store_path(const fs::path& folder) { return folder / "run.db"; }
 
 std::string kind_name(RunKind kind) { return kind == RunKind::simulated ? "simulated" : "measured"; }
 
+constexpr const char* results_of_a_run[] = {
+    "summary.json", "surface.json", "surface.step", "surface.igs",    "boundary.ply",   "points.ply",
+    "track.json",   "events.jsonl", "overview.svg", "timing.json",    "report.html",    "inspection.json",
+    "design.json",  "frames.txt",   "frames.html",  "deviations.csv", "deviations.ply", "watchdog.json"};
+
 void remove_store(const fs::path& folder) {
   std::error_code failed;
   for (const char* file : {"run.db", "run.db-wal", "run.db-shm"}) fs::remove(folder / file, failed);
@@ -40,6 +45,9 @@ std::expected<void, Failure> remove_simulated(const fs::path& folder) {
     return error(fmt::format("{}: holds a run already; give another --out", folder.string()));
   }
   remove_store(folder);
+  // A new run that does not come so far must not stand beside what the old one found.
+  std::error_code failed;
+  for (const char* file : results_of_a_run) fs::remove(folder / file, failed);
   return {};
 }
 

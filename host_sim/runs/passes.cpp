@@ -37,6 +37,7 @@ std::expected<Pass, SimError> run_pass(const PassesOptions& options, int number,
   SimulatedRunOptions run;
   run.cell = options.cell;
   run.cell.formed = mistakes;
+  run.cell.has_design = true;
   run.out = options.out / fmt::format("pass-{}", number);
   run.name = fmt::format("{}, pass {}", options.cell.plate, number);
   const auto done = simulate(run);

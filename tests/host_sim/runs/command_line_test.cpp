@@ -104,7 +104,7 @@ TEST_CASE(
     CHECK(holds(iges, "remark: second pass "));
     CHECK(holds(picture, "Moldloft run: Hull 7/&lt;12&gt; 'port'<"));
     CHECK(holds(picture, "cell simulated SCARA cell; moldloft " + version));
-    CHECK(holds(page, "<title>Timing of Hull 7/&lt;12&gt; 'port'</title>"));
+    CHECK(holds(page, "<title>Hull 7/&lt;12&gt; 'port'</title>"));
     CHECK(holds(page, "remark: second pass"));
   };
   check_results(out);
