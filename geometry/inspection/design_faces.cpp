@@ -11,8 +11,9 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int samples_a_loop = 640;    // of the border
-constexpr int area_grid = 24;          // per side, for area, mean normal and centroid
+constexpr double samples_a_loop = 960, samples_a_span = 6;  // of the border
+constexpr int most_samples = 4000;                          // a chord
+constexpr int area_grid = 24;                               // per side, for area, mean normal and centroid
 constexpr double domain_slack = 1e-9;  // of the domain's length: what a writer's rounding may leave
 
 // Even-odd rule over all loops: holes count once more.
@@ -63,24 +64,31 @@ std::expected<void, Error> check_trims(const PreparedSurface& surface, std::span
   return {};
 }
 
-// Samples along a chord of the parameters. No tangent plane, no sample.
+// The border's tangent plane at a place of a chord; no length where there is none.
+BorderSample border_at(const PreparedSurface& surface, const Vector2d& uv, const Vector2d& step) {
+  const auto r = surface.at(uv.x(), uv.y());
+  const Vector3d along = r.du * step.x() + r.dv * step.y(), normal = r.du.cross(r.dv);
+  BorderSample sample{.at = r.value, .outward = Vector3d::Zero(), .length_mm = 0, .uv = uv, .step = step};
+  if (!(along.norm() > 0) || !(normal.norm() > 0)) return sample;
+  // The face lies to the left of its loop, seen against du x dv.
+  sample.outward = along.normalized().cross(normal.normalized()).normalized();
+  sample.length_mm = along.norm();
+  return sample;
+}
+
 void add_samples(const PreparedSurface& surface, const Vector2d& a, const Vector2d& b, int count,
                  std::vector<BorderSample>& out) {
+  const Vector2d step = (b - a) / count;
   for (int k = 0; k < count; ++k) {
-    const Vector2d uv = a + (b - a) * (k + 0.5) / count;
-    const auto r = surface.at(uv.x(), uv.y());
-    const Vector3d along = r.du * (b - a).x() + r.dv * (b - a).y();
-    const Vector3d normal = r.du.cross(r.dv);
-    if (!(along.norm() > 0) || !(normal.norm() > 0)) continue;
-    // The face lies to the left of its loop, seen against du x dv.
-    out.push_back({.at = r.value,
-                   .outward = along.normalized().cross(normal.normalized()).normalized(),
-                   .length_mm = along.norm() / count});
+    const auto sample = border_at(surface, a + (k + 0.5) * step, step);
+    if (sample.length_mm > 0) out.push_back(sample);
   }
 }
 
-// Chords of a loop get samples by their share of it, and at least two: a trim may have four corners or a thousand.
+// Chords of a loop get samples by their share of it, and some in each knot span that they cross: a trim may have four
+// corners or a thousand, and a torn rim bends within a few spans.
 std::vector<BorderSample> border_of(const PreparedSurface& surface, std::span<const TrimPolygon> loops) {
+  const auto &u = surface.along_u(), &v = surface.along_v();
   std::vector<BorderSample> border;
   for (const auto& loop : loops) {
     std::vector<double> lengths;
@@ -91,8 +99,12 @@ std::vector<BorderSample> border_of(const PreparedSurface& surface, std::span<co
       all += lengths.back();
     }
     for (std::size_t i = 0; i < loop.size(); ++i) {
-      const int share = static_cast<int>(std::lround(samples_a_loop * lengths[i] / std::max(all, 1e-300)));
-      add_samples(surface, loop[i], loop[(i + 1) % loop.size()], std::max(2, share), border);
+      const Vector2d &a = loop[i], &b = loop[(i + 1) % loop.size()];
+      const double spans = std::abs(b.x() - a.x()) / (u.last() - u.first()) * u.count() +
+                           std::abs(b.y() - a.y()) / (v.last() - v.first()) * v.count();
+      const double wanted =
+          std::max(samples_a_loop * lengths[i] / std::max(all, 1e-300), samples_a_span * spans);
+      add_samples(surface, a, b, std::clamp(static_cast<int>(std::lround(wanted)), 2, most_samples), border);
     }
   }
   return border;
@@ -173,9 +185,33 @@ void DesignFaces::join(std::size_t largest) {
       };
       bool seam = false;
       for (int other = 0; other < count() && !seam; ++other) seam = meets(other);
-      if (!seam) border_.push_back(sample);
+      if (seam) continue;
+      border_.push_back(sample);
+      border_.back().face = n;
     }
   }
+}
+
+BorderSample DesignFaces::border_near(const Vector3d& p) const {
+  constexpr int steps = 4;
+  constexpr double farthest = 0.75;  // of a step: beyond it another sample is nearer
+  const BorderSample* best = &border_.front();
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& sample : border_) {
+    const double d = (p - sample.at).squaredNorm();
+    if (d < least) least = d, best = &sample;
+  }
+  const auto& surface = faces_[static_cast<std::size_t>(best->face)].surface;
+  double way = 0;
+  for (int k = 0; k < steps; ++k) {
+    const Vector2d uv = best->uv + way * best->step;
+    const auto r = surface.at(uv.x(), uv.y());
+    const Vector3d along = r.du * best->step.x() + r.dv * best->step.y();
+    way = std::clamp(way + along.dot(p - r.value) / along.squaredNorm(), -farthest, farthest);
+  }
+  BorderSample near = border_at(surface, best->uv + way * best->step, best->step);
+  near.face = best->face;
+  return near.length_mm > 0 ? near : *best;
 }
 
 bool DesignFaces::is_on(int face, double u, double v) const {

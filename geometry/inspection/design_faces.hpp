@@ -39,8 +39,11 @@ struct DesignFoot {
 };
 
 struct BorderSample {
-  Eigen::Vector3d at, outward;  // outward: the unit vector in the tangent plane that leads away from the plate
-  double length_mm = 0;         // of the border that it stands for
+  Eigen::Vector3d at,
+      outward;               // outward: the unit vector in the tangent plane that leads away from the plate
+  double length_mm = 0;      // of the border that it stands for
+  Eigen::Vector2d uv, step;  // its place in the face, and the way to the next one
+  int face = 0;
 };
 
 class DesignFaces {
@@ -52,6 +55,8 @@ class DesignFaces {
   DesignFoot foot(const Eigen::Vector3d& p) const;
 
   const std::vector<BorderSample>& border() const { return border_; }
+  // The place of the border nearest to p: the nearest sample, moved along the border's curve. About 1 us.
+  BorderSample border_near(const Eigen::Vector3d& p) const;
   const Eigen::Vector3d& centroid() const { return centroid_; }  // of the area
   const Eigen::Vector3d& up() const { return up_; }              // mean normal
   double area_mm2() const { return area_; }

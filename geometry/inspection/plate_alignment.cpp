@@ -41,17 +41,6 @@ double spread(const std::vector<Equation>& equations) {
   return sigma_from_median * *middle;
 }
 
-// Nearest of the border's samples, by brute force: an outline has some hundred points.
-const BorderSample& nearest(const std::vector<BorderSample>& border, const Vector3d& q) {
-  const BorderSample* best = &border.front();
-  double least = std::numeric_limits<double>::infinity();
-  for (const auto& sample : border) {
-    const double d = (q - sample.at).squaredNorm();
-    if (d < least) least = d, best = &sample;
-  }
-  return *best;
-}
-
 class Alignment {
  public:
   Alignment(const DesignFaces& design, const PlateToAlign& plate, const PlateAlignmentSettings& settings)
@@ -111,7 +100,7 @@ void Alignment::look(const RigidMotion& pose) {
 }
 
 void Alignment::add_edge(const Vector3d& q, const Vector3d& c) {
-  const auto& border = nearest(design_.border(), q);
+  const auto border = design_.border_near(q);
   edges_.push_back({.row = row_of(border.outward, q - c, radius_),
                     .distance = border.outward.dot(q - border.at),
                     .weight = 1});
