@@ -5,6 +5,7 @@
 #include <BRepTools.hxx>
 #include <BRepTools_WireExplorer.hxx>
 #include <BRep_Tool.hxx>
+#include <Geom2dAdaptor_Curve.hxx>
 #include <Geom2d_Curve.hxx>
 #include <GeomConvert.hxx>
 #include <Geom_BSplineSurface.hxx>
@@ -30,6 +31,7 @@
 #include <cctype>
 #include <map>
 #include <optional>
+#include <ranges>
 
 namespace moldloft::firmware_like {
 namespace {
@@ -38,7 +40,8 @@ namespace fs = std::filesystem;
 using geometry::DesignFace;
 using geometry::TrimPolygon;
 
-constexpr int points_an_edge = 48;      // of a trim, in (u, v): a chord of an edge of 300 mm is 6 mm
+constexpr int most_halvings = 10;       // of a smooth piece of the border
+constexpr double border_slack = 1e-4;   // of the domain: what a writer's tolerance leaves beyond its end
 constexpr int most_spans = 200;         // of an approximated surface
 constexpr double natural_share = 1e-6;  // of the domain: a trim that runs along the knots is none
 
@@ -129,30 +132,104 @@ std::optional<geometry::BSplineSurface> followed(const Handle(Geom_BSplineSurfac
   return std::nullopt;
 }
 
-// The wire's edges in its own order, in (u, v) of the face's surface.
-TrimPolygon polygon_of(const TopoDS_Wire& wire, const TopoDS_Face& face) {
+// How far `at` lies from the chord, in space: the nearest place in (u, v) counts, not the one of the same share.
+double off_chord_mm(const geometry::BSplineSurface& s, const gp_Pnt2d& at, const gp_Pnt2d& from,
+                    const gp_Pnt2d& to) {
+  const auto here = s.at(at.X(), at.Y());
+  const Eigen::Vector3d chord = here.du * (to.X() - from.X()) + here.dv * (to.Y() - from.Y());
+  const Eigen::Vector3d gone = here.du * (at.X() - from.X()) + here.dv * (at.Y() - from.Y());
+  const double square = chord.squaredNorm();
+  const double share = square > 0 ? std::clamp(gone.dot(chord) / square, 0.0, 1.0) : 0;
+  return (gone - share * chord).norm();
+}
+
+// The places of one smooth piece of a border, its end left to the next piece. A chord is halved until it follows.
+void add_piece(const Geom2dAdaptor_Curve& curve, const geometry::BSplineSurface& s, double from, double to,
+               int halvings, TrimPolygon& polygon) {
+  const gp_Pnt2d a = curve.Value(from), b = curve.Value(to);
+  double off = 0;
+  for (const double part : {0.25, 0.5, 0.75})
+    off = std::max(off, off_chord_mm(s, curve.Value(from + (to - from) * part), a, b));
+  if (halvings == 0 || (halvings <= most_halvings && off < border_mm)) {
+    polygon.push_back({a.X(), a.Y()});
+    return;
+  }
+  const double middle = (from + to) / 2;
+  add_piece(curve, s, from, middle, halvings - 1, polygon);
+  add_piece(curve, s, middle, to, halvings - 1, polygon);
+}
+
+// The wire's edges in its own order, in (u, v) of the face's surface. Corners of a curve are kept.
+std::expected<TrimPolygon, std::string> polygon_of(const TopoDS_Wire& wire, const TopoDS_Face& face,
+                                                   const geometry::BSplineSurface& s) {
   TrimPolygon polygon;
-  for (BRepTools_WireExplorer edges(wire, face); edges.More(); edges.Next()) {
+  int edges = 0, in_order = 0;
+  for (TopExp_Explorer all(wire, TopAbs_EDGE); all.More(); all.Next()) ++edges;
+  for (BRepTools_WireExplorer all(wire, face); all.More(); all.Next(), ++in_order) {
     double first = 0, last = 0;
-    const Handle(Geom2d_Curve) curve = BRep_Tool::CurveOnSurface(edges.Current(), face, first, last);
-    if (curve.IsNull()) continue;
-    const bool reversed = edges.Current().Orientation() == TopAbs_REVERSED;
-    for (int i = 0; i < points_an_edge; ++i) {
-      const double part = static_cast<double>(reversed ? points_an_edge - i : i) / points_an_edge;
-      const gp_Pnt2d p = curve->Value(first + (last - first) * part);
-      polygon.push_back({p.X(), p.Y()});
+    const Handle(Geom2d_Curve) drawn = BRep_Tool::CurveOnSurface(all.Current(), face, first, last);
+    if (drawn.IsNull()) return std::unexpected("a face with a border that does not lie on it");
+    const Geom2dAdaptor_Curve curve(drawn, first, last);
+    TColStd_Array1OfReal ends(1, curve.NbIntervals(GeomAbs_C1) + 1);
+    curve.Intervals(ends, GeomAbs_C1);
+    const bool reversed = all.Current().Orientation() == TopAbs_REVERSED;
+    for (int i = 1; i < ends.Length(); ++i) {
+      const int k = reversed ? ends.Length() - i : i;
+      add_piece(curve, s, ends(reversed ? k + 1 : k), ends(reversed ? k : k + 1), most_halvings + 1, polygon);
     }
   }
+  if (in_order != edges) return std::unexpected("a face with a border that is not closed");
   return polygon;
 }
 
+// Moves a border of a closed surface by whole turns into the surface's knots; what still leaves them is refused, but
+// for what a writer's tolerance leaves.
+bool fits_into(TrimPolygon& polygon, int axis, const std::vector<double>& knots, bool closed) {
+  if (polygon.empty()) return true;
+  const double first = knots.front(), last = knots.back(), length = last - first;
+  const auto [low, high] =
+      std::ranges::minmax(polygon | std::views::transform([axis](const auto& p) { return p[axis]; }));
+  const double turns = closed ? std::round(((first + last) - (low + high)) / 2 / length) * length : 0;
+  const double slack = border_slack * length;
+  if (!(low + turns >= first - slack && high + turns <= last + slack)) return false;
+  for (auto& p : polygon) p[axis] = std::clamp(p[axis] + turns, first, last);
+  return true;
+}
+
+// Every chord runs along one side of the knots' rectangle: no trim at all.
 bool is_natural(const TrimPolygon& polygon, const geometry::BSplineSurface& s) {
-  const double u0 = s.knots_u.front(), u1 = s.knots_u.back(), v0 = s.knots_v.front(), v1 = s.knots_v.back();
-  return std::ranges::all_of(polygon, [&](const Eigen::Vector2d& p) {
-    const double off_u = std::min(std::abs(p.x() - u0), std::abs(p.x() - u1)) / (u1 - u0);
-    const double off_v = std::min(std::abs(p.y() - v0), std::abs(p.y() - v1)) / (v1 - v0);
-    return std::min(off_u, off_v) < natural_share;
-  });
+  const auto along = [](double a, double b, const std::vector<double>& knots) {
+    const double slack = natural_share * (knots.back() - knots.front());
+    const auto both = [&](double side) { return std::abs(a - side) < slack && std::abs(b - side) < slack; };
+    return both(knots.front()) || both(knots.back());
+  };
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const auto &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    if (!along(a.x(), b.x(), s.knots_u) && !along(a.y(), b.y(), s.knots_v)) return false;
+  }
+  return true;
+}
+
+struct Closed {
+  bool u = false, v = false;
+};
+
+std::expected<void, std::string> add_trims(const TopoDS_Face& face, Closed closed, DesignFace& one) {
+  const TopoDS_Wire outer = BRepTools::OuterWire(face);
+  if (outer.IsNull()) return {};
+  std::vector<TrimPolygon> borders;
+  for (TopExp_Explorer wires(face, TopAbs_WIRE); wires.More(); wires.Next()) {
+    auto polygon = polygon_of(TopoDS::Wire(wires.Current()), face, one.surface);
+    if (!polygon) return std::unexpected(polygon.error());
+    if (polygon->size() < 3) return std::unexpected("a face with a border without corners");
+    if (!fits_into(*polygon, 0, one.surface.knots_u, closed.u) ||
+        !fits_into(*polygon, 1, one.surface.knots_v, closed.v))
+      return std::unexpected("a face with a border beyond the end of its surface");
+    const bool is_outer = wires.Current().IsSame(outer);
+    borders.insert(is_outer ? borders.begin() : borders.end(), std::move(*polygon));
+  }
+  if (borders.size() > 1 || !is_natural(borders.front(), one.surface)) one.trims = std::move(borders);
+  return {};
 }
 
 std::expected<void, std::string> add_face(const TopoDS_Face& face, ImportedDesign& design) {
@@ -160,6 +237,7 @@ std::expected<void, std::string> add_face(const TopoDS_Face& face, ImportedDesig
   Handle(Geom_BSplineSurface) spline = spline_of(given);
   if (spline.IsNull()) return std::unexpected(name_of(given));
   spline = Handle(Geom_BSplineSurface)::DownCast(spline->Copy());
+  const Closed closed{spline->IsUPeriodic(), spline->IsVPeriodic()};
   if (spline->IsUPeriodic()) spline->SetUNotPeriodic();
   if (spline->IsVPeriodic()) spline->SetVNotPeriodic();
   DesignFace one;
@@ -173,27 +251,7 @@ std::expected<void, std::string> add_face(const TopoDS_Face& face, ImportedDesig
     return std::unexpected(fmt::format("a surface of degree {} x {} that no cubic one follows within {:g} mm",
                                        spline->UDegree(), spline->VDegree(), approximated_mm));
   }
-  const TopoDS_Wire outer = BRepTools::OuterWire(face);
-  const auto clamp = [&](TrimPolygon& polygon) {
-    for (auto& p : polygon) {
-      p.x() = std::clamp(p.x(), one.surface.knots_u.front(), one.surface.knots_u.back());
-      p.y() = std::clamp(p.y(), one.surface.knots_v.front(), one.surface.knots_v.back());
-    }
-  };
-  if (!outer.IsNull()) {
-    auto polygon = polygon_of(outer, face);
-    clamp(polygon);
-    std::vector<TrimPolygon> holes;
-    for (TopExp_Explorer wires(face, TopAbs_WIRE); wires.More(); wires.Next()) {
-      if (wires.Current().IsSame(outer)) continue;
-      holes.push_back(polygon_of(TopoDS::Wire(wires.Current()), face));
-      clamp(holes.back());
-    }
-    if (polygon.size() >= 3 && (!is_natural(polygon, one.surface) || !holes.empty())) {
-      one.trims.push_back(std::move(polygon));
-      std::ranges::move(holes, std::back_inserter(one.trims));
-    }
-  }
+  if (const auto trimmed = add_trims(face, closed, one); !trimmed) return trimmed;
   design.faces.push_back(std::move(one));
   return {};
 }
@@ -245,6 +303,9 @@ std::expected<ImportedDesign, Failure> import_cad(const fs::path& path) {
     }
     if (faces == 0) return refuse("holds no face");
     if (others.empty()) return design;
+    if (others.size() == 1 && others.contains("a plane") && design.faces.empty())
+      return refuse(fmt::format(
+          "holds only planes ({}), and no formed face: export the plate's face as B-spline", faces));
     std::vector<std::string> words;
     for (const auto& [name, count] : others)
       words.push_back(count == 1 ? name : fmt::format("{} ({} times)", name, count));

@@ -3,6 +3,7 @@
 //
 // Faces        B-spline and Bezier surfaces, trimmed or not. Up to degree 3 they are taken over as they are; those of
 //              higher degree and rational ones become cubic within approximated_mm. Others are refused by name
+// Borders      chords within border_mm of the curves, corners kept; one that leaves its surface is refused
 // Units        mm, whatever the file's unit is; placements of assemblies are applied
 // Thread       one at a time: OpenCASCADE keeps settings of its own
 // Blocking     reads a file
@@ -20,6 +21,7 @@
 namespace moldloft::firmware_like {
 
 constexpr double approximated_mm = 1e-4;
+constexpr double border_mm = 0.005;
 
 struct ImportedDesign {
   std::vector<geometry::DesignFace> faces;
