@@ -21,6 +21,7 @@ namespace moldloft::bench {
 Json run_curvature(const Options&);
 Json run_edges(const Options&);
 Json run_fit(const Options&);
+Json run_inspect(const Options&);
 Json run_localize(const Options&);
 Json run_project(const Options&);
 Json run_scheduler(const Options&);
@@ -31,6 +32,7 @@ std::span<const Benchmark> all_benchmarks() {
       {"fit", "surface fit: floors, nets, choice of the net, bad data, growth", run_fit},
       {"project", "foot points with a guess and from nowhere", run_project},
       {"localize", "poses of measured points, and their deviations", run_localize},
+      {"inspect", "a run against its design, from all sides, with map and frames", run_inspect},
       {"curvature", "curvature maps, contours, and the fit whose parameters are not known", run_curvature},
       {"edges", "the plate's edge in one shot", run_edges},
       {"scheduler", "what a tick costs beside its tasks", run_scheduler},
