@@ -218,7 +218,7 @@ std::vector<Eigen::Vector3d> template_edges(const TemplateList& list) {
   };
   const auto last = ends.size() - 1;
   const Ends before = beyond(ends[0], ends[1], -*list.before_first_mm);
-  const Ends after = beyond(ends[last], ends[last - 1], -*list.after_last_mm);
+  const Ends after = beyond(ends[last], ends[last - 1], *list.after_last_mm);
   ends.insert(ends.begin(), before);
   ends.push_back(after);
   const double all = (ends.back().lower - ends.front().lower).norm();
@@ -256,6 +256,7 @@ Design design_from(TemplateList list, const fs::path& path) {
   }
   design.remarks.push_back(
       fmt::format("{} frames, pins every {:g} mm", list.frames.size(), list.distance_mm));
+  design.edges = template_edges(list);
   design.templates = std::move(list);
   return design;
 }

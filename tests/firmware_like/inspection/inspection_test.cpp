@@ -266,6 +266,8 @@ TEST_CASE("templates: gaps at every pin, bend, twist, and the list comes back as
   const auto found = inspect(run_of(surface_of(bent, 2000, 1000, somewhere())), {}, *design, {});
   REQUIRE_MESSAGE(found.has_value(), found.error().what);
   REQUIRE(found->frame_lines.size() == 5);
+  CHECK(found->undetermined.empty());  // the list says where seams and ends are
+  CHECK(found->alignment.border_rms_mm > 0);
   for (const auto& f : found->frame_lines) {
     CHECK(f.measured >= 9);
     // 0.1 y^2 / 9000 at y = 500: a sagitta of 2.78 mm is missing.
