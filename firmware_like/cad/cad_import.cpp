@@ -28,7 +28,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <ranges>
@@ -40,6 +43,7 @@ namespace fs = std::filesystem;
 using geometry::DesignFace;
 using geometry::TrimPolygon;
 
+constexpr double farthest_mm = 1e7;     // of a control point: no ship is longer
 constexpr int most_halvings = 10;       // of a smooth piece of the border
 constexpr double border_slack = 1e-4;   // of the domain: what a writer's tolerance leaves beyond its end
 constexpr int most_spans = 200;         // of an approximated surface
@@ -168,7 +172,7 @@ std::expected<TrimPolygon, std::string> polygon_of(const TopoDS_Wire& wire, cons
   for (BRepTools_WireExplorer all(wire, face); all.More(); all.Next(), ++in_order) {
     double first = 0, last = 0;
     const Handle(Geom2d_Curve) drawn = BRep_Tool::CurveOnSurface(all.Current(), face, first, last);
-    if (drawn.IsNull()) return std::unexpected("a face with a border that does not lie on it");
+    if (drawn.IsNull()) return std::unexpected("has a border that does not lie on it");
     const Geom2dAdaptor_Curve curve(drawn, first, last);
     TColStd_Array1OfReal ends(1, curve.NbIntervals(GeomAbs_C1) + 1);
     curve.Intervals(ends, GeomAbs_C1);
@@ -178,7 +182,7 @@ std::expected<TrimPolygon, std::string> polygon_of(const TopoDS_Wire& wire, cons
       add_piece(curve, s, ends(reversed ? k + 1 : k), ends(reversed ? k : k + 1), most_halvings + 1, polygon);
     }
   }
-  if (in_order != edges) return std::unexpected("a face with a border that is not closed");
+  if (in_order != edges) return std::unexpected("has a border that is not closed");
   return polygon;
 }
 
@@ -221,10 +225,10 @@ std::expected<void, std::string> add_trims(const TopoDS_Face& face, Closed close
   for (TopExp_Explorer wires(face, TopAbs_WIRE); wires.More(); wires.Next()) {
     auto polygon = polygon_of(TopoDS::Wire(wires.Current()), face, one.surface);
     if (!polygon) return std::unexpected(polygon.error());
-    if (polygon->size() < 3) return std::unexpected("a face with a border without corners");
+    if (polygon->size() < 3) return std::unexpected("has a border without an area");
     if (!fits_into(*polygon, 0, one.surface.knots_u, closed.u) ||
         !fits_into(*polygon, 1, one.surface.knots_v, closed.v))
-      return std::unexpected("a face with a border beyond the end of its surface");
+      return std::unexpected("has a border beyond the end of its surface");
     const bool is_outer = wires.Current().IsSame(outer);
     borders.insert(is_outer ? borders.begin() : borders.end(), std::move(*polygon));
   }
@@ -232,7 +236,15 @@ std::expected<void, std::string> add_trims(const TopoDS_Face& face, Closed close
   return {};
 }
 
-std::expected<void, std::string> add_face(const TopoDS_Face& face, ImportedDesign& design) {
+bool is_within_reach(const geometry::BSplineSurface& s) {
+  return std::ranges::all_of(std::array{&s.x, &s.y, &s.z}, [](const Eigen::MatrixXd* net) {
+    return net->allFinite() && net->cwiseAbs().maxCoeff() <= farthest_mm;
+  });
+}
+
+// Fails with the name of what the face is instead. A fault of a face that is a B-spline goes to `fault`.
+std::expected<void, std::string> add_face(const TopoDS_Face& face, ImportedDesign& design,
+                                          std::string& fault) {
   const Handle(Geom_Surface) given = BRep_Tool::Surface(face);
   Handle(Geom_BSplineSurface) spline = spline_of(given);
   if (spline.IsNull()) return std::unexpected(name_of(given));
@@ -251,9 +263,36 @@ std::expected<void, std::string> add_face(const TopoDS_Face& face, ImportedDesig
     return std::unexpected(fmt::format("a surface of degree {} x {} that no cubic one follows within {:g} mm",
                                        spline->UDegree(), spline->VDegree(), approximated_mm));
   }
-  if (const auto trimmed = add_trims(face, closed, one); !trimmed) return trimmed;
+  if (!is_within_reach(one.surface)) {
+    fault = fmt::format("reaches beyond {:g} mm: its numbers or its unit are wrong", farthest_mm);
+  } else if (const auto trimmed = add_trims(face, closed, one); !trimmed) {
+    fault = trimmed.error();
+  }
   design.faces.push_back(std::move(one));
   return {};
+}
+
+// OpenCASCADE searches without end for a place that is no number. STEP has no such word outside of its strings.
+bool says_no_number(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  const std::istreambuf_iterator<char> end;
+  bool in_string = false, begins = false;
+  std::string word;
+  for (std::istreambuf_iterator<char> at(in); at != end; ++at) {
+    const char c = *at;
+    if (c == '\'') in_string = !in_string;
+    if (in_string) continue;
+    if (c == '(' || c == ',' || c == ')') {
+      begins = c != ')';
+      if (word.starts_with("NAN") || word.starts_with("INF")) return true;
+      word.clear();
+    } else if (begins && word.size() < 4 && std::isalpha(static_cast<unsigned char>(c)) != 0) {
+      word += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    } else if (c != '+' && c != '-' && std::isspace(static_cast<unsigned char>(c)) == 0) {
+      begins = false;
+    }
+  }
+  return false;
 }
 
 std::expected<TopoDS_Shape, std::string> read_shape(const fs::path& path, std::string& unit) {
@@ -271,6 +310,7 @@ std::expected<TopoDS_Shape, std::string> read_shape(const fs::path& path, std::s
   }
   if (ending != ".stp" && ending != ".step")
     return std::unexpected("has no ending that is known: .step, .stp, .iges or .igs");
+  if (says_no_number(path)) return std::unexpected("holds a coordinate that is no number (NAN or INF)");
   STEPControl_Reader reader;
   if (reader.ReadFile(path.c_str()) != IFSelect_RetDone)
     return std::unexpected("is no STEP file that can be read");
@@ -288,6 +328,7 @@ std::expected<ImportedDesign, Failure> import_cad(const fs::path& path) {
     return std::unexpected(Failure{fmt::format("{}: {}", path.string(), why)});
   };
   std::error_code failed;
+  if (fs::exists(path, failed) && !fs::is_regular_file(path, failed)) return refuse("is no file");
   if (!fs::is_regular_file(path, failed)) return refuse("no such file");
   Message::DefaultMessenger()->RemovePrinters(
       Message_Printer::get_type_descriptor());  // it would talk on standard output
@@ -299,7 +340,12 @@ std::expected<ImportedDesign, Failure> import_cad(const fs::path& path) {
     std::map<std::string, int> others;
     int faces = 0;
     for (TopExp_Explorer all(*shape, TopAbs_FACE); all.More(); all.Next(), ++faces) {
-      if (const auto added = add_face(TopoDS::Face(all.Current()), design); !added) ++others[added.error()];
+      std::string fault;
+      const auto added = add_face(TopoDS::Face(all.Current()), design, fault);
+      if (!added) ++others[added.error()];
+      if (!fault.empty())
+        return refuse(
+            fmt::format("face {} {}; heal it where it was drawn, and export it again", faces + 1, fault));
     }
     if (faces == 0) return refuse("holds no face");
     if (others.empty()) return design;

@@ -26,8 +26,9 @@ int import_command(const std::string& file, const std::string& out, bool force) 
   std::size_t trimmed = 0;
   for (const auto& face : design->faces) trimmed += face.trims.empty() ? 0 : 1;
   const std::string line = fmt::format(
-      "{}: {} faces, {} trimmed, {} made cubic within {:g} mm; the file's unit is {}, design.json is in mm\n",
-      moldloft::hal::printable(out), design->faces.size(), trimmed, design->approximated, approximated_mm,
+      "{}: {} {}, {} trimmed, {} made cubic within {:g} mm; the file's unit is {}, design.json is in mm\n",
+      moldloft::hal::printable(out), design->faces.size(), design->faces.size() == 1 ? "face" : "faces",
+      trimmed, design->approximated, approximated_mm,
       design->unit.empty() ? "not named" : moldloft::hal::printable(design->unit));
   is_standard_output(out) ? say(line) : show(line);
   return exit_done;

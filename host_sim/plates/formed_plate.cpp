@@ -4,6 +4,7 @@
 #include "host_sim/base/plan_polygon.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
@@ -16,6 +17,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double largest_mm = 500;
+constexpr double farthest_shift_mm = 100;
 constexpr int spline_points = 48;  // each way: a span of 7 mm on the plate of 305 mm
 
 class MistakenPlate final : public Plate {
@@ -33,7 +35,7 @@ class MistakenPlate final : public Plate {
   }
 
   SurfaceSample sample(double x, double y) const noexcept override {
-    SurfaceSample s = base_->sample(x, y);
+    SurfaceSample s = base_->sample(x - mistakes_.shift_x_mm, y - mistakes_.shift_y_mm);
     s.z *= mistakes_.springback, s.slope_x *= mistakes_.springback, s.slope_y *= mistakes_.springback;
     const double p = (x - middle_.x()) / half_.x(), q = (y - middle_.y()) / half_.y();
     s.z += mistakes_.twist_mm / 4 * p * q + mistakes_.bow_mm * p * p;
@@ -79,7 +81,7 @@ class MistakenPlate final : public Plate {
 std::unexpected<SimError> refuse(std::string what) { return std::unexpected(SimError{std::move(what)}); }
 
 // The words of one mistake, blanks and commas inside a place taken for one.
-std::vector<std::string> words_of(std::string_view part) {
+std::vector<std::string> words_in(std::string_view part) {
   std::vector<std::string> words;
   for (std::size_t at = 0; at < part.size();) {
     while (at < part.size() && (part[at] == ' ' || part[at] == ',')) ++at;
@@ -156,48 +158,100 @@ std::optional<Dent> dent_from(Words& words) {
   return dent;
 }
 
+// Beyond its end a cylinder goes on flat, with slopes that are not those of its heights.
+bool has_slope(const Plate& plate, const Vector2d& p) {
+  constexpr double step_mm = 1e-3, tolerance = 0.01;
+  const auto s = plate.sample(p.x(), p.y());
+  const double rise_x = plate.height(p.x() + step_mm, p.y()) - plate.height(p.x() - step_mm, p.y());
+  const double rise_y = plate.height(p.x(), p.y() + step_mm) - plate.height(p.x(), p.y() - step_mm);
+  const auto fits = [](double rise, double slope) {
+    return std::abs(rise / (2 * step_mm) - slope) <= tolerance * (1 + std::abs(slope));
+  };
+  return fits(rise_x, s.slope_x) && fits(rise_y, s.slope_y);
+}
+
+bool take_mistake(const std::vector<std::string>& all, bool first, Mistakes& mistakes) {
+  Words words{all};
+  const auto take = [](const std::optional<double>& value, double& into) {
+    if (value) into = *value;
+    return value.has_value();
+  };
+  bool good = false;
+  if (words.take("springback")) {
+    good = take(words.take_number(), mistakes.springback) && mistakes.springback >= 0 &&
+           mistakes.springback <= 3;
+  } else if (words.take("twist")) {
+    good = take(millimetres(words), mistakes.twist_mm);
+  } else if (words.take("bow")) {
+    good = take(millimetres(words), mistakes.bow_mm);
+  } else if (words.take("shift")) {
+    good = take(words.take_number(), mistakes.shift_x_mm) && take(millimetres(words), mistakes.shift_y_mm) &&
+           std::max(std::abs(mistakes.shift_x_mm), std::abs(mistakes.shift_y_mm)) <= farthest_shift_mm;
+  } else if (words.take("dent")) {
+    const auto dent = dent_from(words);
+    good = dent.has_value();
+    if (dent) mistakes.dents.push_back(*dent);
+  } else if (const auto shape = shape_named(all[0]); shape && first) {
+    good = words.take(all[0]);
+    mistakes.shape = *shape;
+  }
+  return good && words.at_end();
+}
+
 }  // namespace
 
 std::expected<Mistakes, SimError> mistakes_from(std::string_view text) {
   Mistakes mistakes;
-  if (words_of(text).empty())
+  if (words_in(text).empty())
     return refuse("say what the plate became, such as 'springback 0.9, dent 5 mm at 100,80'");
-  bool first = true;
+  std::vector<std::string> said;
   for (const auto& part : parts_of(text)) {
-    const auto all = words_of(part);
-    Words words{all};
-    bool good = false;
+    const auto all = words_in(part);
     if (all.empty()) return refuse("nothing stands between two commas");
-    if (words.take("springback")) {
-      const auto factor = words.take_number();
-      good = factor && *factor >= 0 && *factor <= 3;
-      mistakes.springback = factor.value_or(1);
-    } else if (words.take("twist")) {
-      const auto mm = millimetres(words);
-      good = mm.has_value();
-      mistakes.twist_mm = mm.value_or(0);
-    } else if (words.take("bow")) {
-      const auto mm = millimetres(words);
-      good = mm.has_value();
-      mistakes.bow_mm = mm.value_or(0);
-    } else if (words.take("dent")) {
-      const auto dent = dent_from(words);
-      good = dent.has_value();
-      if (dent) mistakes.dents.push_back(*dent);
-    } else if (const auto shape = shape_named(all[0]); shape && first) {
-      words.take(all[0]);
-      mistakes.shape = *shape;
-      good = true;
-    }
     const std::string_view shown = std::string_view{part}.substr(part.find_first_not_of(' '));
-    if (!good || !words.at_end())
+    if (!take_mistake(all, said.empty(), mistakes))
       return refuse(
           fmt::format("'{}' is not known: a shape first, springback 0..3, twist T mm, bow B mm, "
-                      "dent D mm at X,Y radius R, up to {:g} mm",
+                      "shift X,Y mm, dent D mm at X,Y radius R, up to {:g} mm",
                       shown, largest_mm));
-    first = false;
+    if (all[0] != "dent" && std::ranges::find(said, all[0]) != said.end())
+      return refuse(fmt::format("'{}' is said twice: only dents may be several", all[0]));
+    said.push_back(all[0]);
   }
   return mistakes;
+}
+
+std::string words_of(const Mistakes& m) {
+  std::vector<std::string> parts;
+  if (m.shape) parts.emplace_back(shape_names()[static_cast<std::size_t>(*m.shape)]);
+  if (m.springback != 1) parts.push_back(fmt::format("springback {}", m.springback));
+  if (m.twist_mm != 0) parts.push_back(fmt::format("twist {} mm", m.twist_mm));
+  if (m.bow_mm != 0) parts.push_back(fmt::format("bow {} mm", m.bow_mm));
+  if (m.shift_x_mm != 0 || m.shift_y_mm != 0)
+    parts.push_back(fmt::format("shift {},{} mm", m.shift_x_mm, m.shift_y_mm));
+  for (const auto& d : m.dents)
+    parts.push_back(fmt::format("dent {} mm at {},{} radius {}", d.depth_mm, d.x_mm, d.y_mm, d.radius_mm));
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+HeightDifference height_difference(const Plate& formed, const Plate& design) {
+  constexpr int steps = 200;
+  const auto& b = formed.bounds();
+  HeightDifference d{0, std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  int count = 0;
+  for (int i = 0; i <= steps; ++i) {
+    for (int k = 0; k <= steps; ++k) {
+      const Vector2d p = b.min + Vector2d{i / double{steps}, k / double{steps}}.cwiseProduct(b.max - b.min);
+      if (!formed.inside(p.x(), p.y())) continue;
+      const double off = formed.height(p.x(), p.y()) - design.height(p.x(), p.y());
+      d.rms_mm += off * off;
+      d.lowest_mm = std::min(d.lowest_mm, off), d.highest_mm = std::max(d.highest_mm, off);
+      ++count;
+    }
+  }
+  if (count == 0) return {};
+  d.rms_mm = std::sqrt(d.rms_mm / count);
+  return d;
 }
 
 std::expected<std::shared_ptr<const Plate>, SimError> make_formed_plate(std::shared_ptr<const Plate> base,
@@ -209,7 +263,14 @@ std::expected<std::shared_ptr<const Plate>, SimError> make_formed_plate(std::sha
           "the dent at {:g},{:g} is not on the plate, which reaches from {:.0f},{:.0f} to {:.0f},{:.0f}",
           dent.x_mm, dent.y_mm, b.min.x(), b.min.y(), b.max.x(), b.max.y()));
   }
-  return std::make_shared<const MistakenPlate>(std::move(base), mistakes);
+  auto formed = std::make_shared<const MistakenPlate>(std::move(base), mistakes);
+  if (mistakes.shift_x_mm == 0 && mistakes.shift_y_mm == 0) return formed;
+  for (const auto& p : sampled_outline(formed->outline(), 1.0)) {
+    if (!has_slope(*formed, p))
+      return refuse(fmt::format("a shift of {:g},{:g} mm moves the plate beyond the end of its shape",
+                                mistakes.shift_x_mm, mistakes.shift_y_mm));
+  }
+  return formed;
 }
 
 geometry::BSplineSurface spline_of(const Plate& plate, const geometry::RigidMotion& placed) {

@@ -7,6 +7,7 @@
 //     SHAPE           what it was formed to, when that is another one than the design
 //     springback F    all heights times F
 //     twist T mm      T/4 p q: one corner stands T out of the plane of the other three
+//     shift X,Y mm    the formed shape lies X, Y beside its place within the outline, which stays (up to 100 mm)
 //     bow B mm        B p^2: the ends across x stand B over the middle
 //     dent D mm at X,Y [radius R]   down by D at (X, Y), as (1 - (r/R)^2)^3, none from R (40 mm) on; below 0: a bump
 //
@@ -20,6 +21,7 @@
 #include <expected>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -31,11 +33,19 @@ struct Dent {
 
 struct Mistakes {
   std::optional<Shape> shape;
-  double springback = 1, twist_mm = 0, bow_mm = 0;
+  double springback = 1, twist_mm = 0, bow_mm = 0, shift_x_mm = 0, shift_y_mm = 0;
   std::vector<Dent> dents = {};
 };
 
 std::expected<Mistakes, SimError> mistakes_from(std::string_view text);
+std::string words_of(
+    const Mistakes&);  // which mistakes_from() reads as the same; empty of a plate without any
+
+// Heights of the one less those of the other, at one place each, over a grid inside the outline: nothing is aligned.
+struct HeightDifference {
+  double rms_mm = 0, lowest_mm = 0, highest_mm = 0;
+};
+HeightDifference height_difference(const Plate& formed, const Plate& design);
 
 // The plate with the mistakes in it. Dents must lie in the outline's bounding box.
 std::expected<std::shared_ptr<const Plate>, SimError> make_formed_plate(std::shared_ptr<const Plate>,

@@ -27,6 +27,7 @@ Mistakes left_of(const Mistakes& before, double part) {
   left.springback = 1 - part * (1 - before.springback);
   left.twist_mm *= part;
   left.bow_mm *= part;
+  left.shift_x_mm *= part, left.shift_y_mm *= part;
   for (auto& dent : left.dents) dent.depth_mm *= part;
   return left;
 }

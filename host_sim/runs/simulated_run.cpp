@@ -33,6 +33,16 @@ Json truth_json(const Verdict& v) {
           {"points", v.points}};
 }
 
+// What the plate was to become, what it became, and how far that is in heights, nothing aligned.
+Json design_truth_json(const CellDescription& cell, const Plate& formed, const Plate& design) {
+  const auto off = height_difference(formed, design);
+  return {{"shape", cell.plate},
+          {"formed", cell.formed ? words_of(*cell.formed) : std::string{}},
+          {"height_rms_mm", off.rms_mm},
+          {"height_lowest_mm", off.lowest_mm},
+          {"height_highest_mm", off.highest_mm}};
+}
+
 // The judge's grid lies on the true plate, the picture's cells on the measured surface: each cell shows the grid point
 // nearest to its middle.
 firmware_like::PlateField error_field(const Verdict& verdict, const geometry::BSplineSurface& surface,
@@ -94,8 +104,9 @@ std::expected<void, SimError> write_design(const CellDescription& cell, const st
   const auto plate = designed_plate(cell);
   if (!plate) return std::unexpected{plate.error()};
   const geometry::DesignFace face{spline_of(**plate), {}};
-  const auto text =
-      firmware_like::json_text(firmware_like::design_json({&face, 1}, "moldloft-sim, shape " + cell.plate), 1) + "\n";
+  const auto text = firmware_like::json_text(
+                        firmware_like::design_json({&face, 1}, "moldloft-sim, shape " + cell.plate), 1) +
+                    "\n";
   const auto written = firmware_like::write_file(folder / "design.json", text);
   if (!written) return std::unexpected{SimError{written.error().what}};
   return {};
@@ -158,6 +169,11 @@ std::expected<SimulatedRun, SimError> simulate(const SimulatedRunOptions& option
     const auto verdict = judge_where_it_lay(*plate, world, *result.measured);
     if (!verdict) return std::unexpected{verdict.error()};
     result.truth = truth_json(*verdict);
+    if (options.cell.has_design) {
+      const auto design = designed_plate(options.cell);
+      if (!design) return std::unexpected{design.error()};
+      result.truth["design"] = design_truth_json(options.cell, *plate->plate, **design);
+    }
     if (options.write_everything) errors = error_field(*verdict, result.measured->surface, 56);
   }
   run.summary = summary_json(result);

@@ -32,6 +32,8 @@
 #include <gp_Pln.hxx>
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <numbers>
 
 using namespace moldloft;
@@ -276,6 +278,29 @@ TEST_CASE("what is no B-spline is refused by its name and count, what is no file
   read = import_cad(folder.file("b.step"));
   REQUIRE_FALSE(read);
   CHECK(read.error().what.find("2 of its 3 faces are no B-spline: a plane (2 times)") != std::string::npos);
+
+  // A number that is none, and one that no plate has.
+  write_step(face_of(wavy()), folder.file("n.step"));
+  std::ifstream in(folder.file("n.step"));
+  const std::string good{std::istreambuf_iterator<char>{in}, {}};
+  for (const auto& [number, words] : {std::pair{"NAN", "no number"},
+                                      {"-INF", "no number"},
+                                      {" nan", "no number"},
+                                      {"3.E29", "face 1 reaches"}}) {
+    CAPTURE(number);
+    std::string bad = good;
+    const auto at = bad.find("(300.,");
+    REQUIRE(at != bad.npos);
+    for (auto i = at; i != bad.npos; i = bad.find("(300.,", i)) bad.replace(i + 1, 4, number);
+    std::ofstream(folder.file("n.step")) << bad;
+    read = import_cad(folder.file("n.step"));
+    REQUIRE_FALSE(read);
+    CHECK_MESSAGE(read.error().what.find(words) != std::string::npos, read.error().what);
+  }
+  std::string named = good;  // a word in a string is no coordinate
+  named.replace(named.find("CARTESIAN_POINT('"), 17, "CARTESIAN_POINT('A,NAN,B");
+  std::ofstream(folder.file("n.step")) << named;
+  CHECK(import_cad(folder.file("n.step")));
 
   for (const char* name : {"none.step", "none.igs", "none.xyz"}) CHECK_FALSE(import_cad(folder.file(name)));
 }
