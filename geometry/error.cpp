@@ -72,6 +72,8 @@ std::string_view to_string(Error error) noexcept {
       return "the surface's parameter lines touch or stand still, so it has no tangent plane there";
     case Error::self_crossing:
       return "an outline crosses itself or another";
+    case Error::no_border:
+      return "the faces lie on each other or close on themselves, so no border is left";
     case Error::open_loop:
       return "the curves of an outline do not meet end to end";
     case Error::wrong_way_round:

@@ -35,6 +35,7 @@ enum class Error {
   folded_map,       // the plan map's Jacobian changes sign: (u, v) is not unique
   outside_domain,   // a point to which no (u, v) belongs
   self_crossing,    // an outline or a loop of trim curves touches itself or another
+  no_border,        // faces that close on themselves, or lie on each other, and so bound nothing
   open_loop,        // curves that should meet end to end do not
   wrong_way_round,  // a loop that has the face on its right
   off_surface,      // a curve that should lie on the surface does not

@@ -5,6 +5,7 @@
 #include "firmware_like/process/json_file.hpp"
 #include "firmware_like/results/stored_result.hpp"
 #include "firmware_like/run/surface_file.hpp"
+#include "geometry/splines/refinement.hpp"
 
 #include <fmt/format.h>
 
@@ -31,34 +32,54 @@ std::unexpected<Failure> refuse(const fs::path& file, std::string_view why) {
   return std::unexpected(Failure{fmt::format("{}: {}", file.string(), why)});
 }
 
+bool are_numbers(const Json& json, std::size_t count) {
+  return json.is_array() && json.size() == count && std::ranges::all_of(json, &Json::is_number);
+}
+
+// Weights that are all alike change nothing.
+bool are_rational(const Json& weights) {
+  return std::ranges::any_of(weights, [&](const Json& weight) { return weight != weights.front(); });
+}
+
 std::expected<DesignFace, std::string> face_of(const Json& json) {
   DesignFace face;
   auto& s = face.surface;
-  if (json.at("degree_u") != 3 || json.at("degree_v") != 3)
-    return std::unexpected("a face is not bicubic; moldloft-cad writes bicubic ones");
-  if (json.contains("weights") && !json.at("weights").empty())
-    return std::unexpected("a face is rational; moldloft-cad writes faces without weights");
+  s.degree_u = json.at("degree_u").get<int>();
+  s.degree_v = json.at("degree_v").get<int>();
+  if (std::min(s.degree_u, s.degree_v) < 1 || std::max(s.degree_u, s.degree_v) > 3)
+    return std::unexpected("is of a degree beyond 3; moldloft-cad writes bicubic faces");
+  if (json.contains("weights") && are_rational(json.at("weights")))
+    return std::unexpected("is rational; moldloft-cad writes faces without weights");
   s.knots_u = json.at("knots_u").get<std::vector<double>>();
   s.knots_v = json.at("knots_v").get<std::vector<double>>();
   const auto& control = json.at("control");
-  if (s.knots_u.size() < 8 || s.knots_v.size() < 8 ||
-      control.size() != (s.knots_u.size() - 4) * (s.knots_v.size() - 4))
+  const auto rows = static_cast<Eigen::Index>(s.knots_u.size()) - s.degree_u - 1,
+             columns = static_cast<Eigen::Index>(s.knots_v.size()) - s.degree_v - 1;
+  if (rows <= s.degree_u || columns <= s.degree_v ||
+      control.size() != static_cast<std::size_t>(rows * columns))
     return std::unexpected("knots and control points do not fit together");
-  const auto rows = static_cast<Eigen::Index>(s.knots_u.size() - 4),
-             columns = static_cast<Eigen::Index>(s.knots_v.size() - 4);
   for (auto* net : {&s.x, &s.y, &s.z}) net->resize(rows, columns);
   std::size_t at = 0;
   for (Eigen::Index i = 0; i < rows; ++i) {
     for (Eigen::Index k = 0; k < columns; ++k, ++at) {
+      if (!are_numbers(control[at], 3))
+        return std::unexpected(fmt::format("control point {} is not three numbers", at + 1));
       s.x(i, k) = control[at].at(0);
       s.y(i, k) = control[at].at(1);
       s.z(i, k) = control[at].at(2);
     }
   }
+  if (const auto fine = geometry::check(s); !fine)
+    return std::unexpected(std::string{geometry::to_string(fine.error())});
+  if (!s.bicubic()) s = geometry::elevate(s, geometry::cubic, geometry::cubic);
   if (!json.contains("trims")) return face;
   for (const auto& loop : json.at("trims")) {
     face.trims.emplace_back();
-    for (const auto& p : loop) face.trims.back().push_back({p.at(0).get<double>(), p.at(1).get<double>()});
+    for (const auto& p : loop) {
+      if (!are_numbers(p, 2))
+        return std::unexpected(fmt::format("a corner of trim {} is not two numbers", face.trims.size()));
+      face.trims.back().push_back({p.at(0).get<double>(), p.at(1).get<double>()});
+    }
   }
   return face;
 }
@@ -78,7 +99,7 @@ std::expected<Design, Failure> read_design_json(const fs::path& path, const Json
     if (json.at("unit") != "mm") return refuse(path, "moldloft-design is in mm");
     for (const auto& one : json.at("faces")) {
       auto face = face_of(one);
-      if (!face) return refuse(path, face.error());
+      if (!face) return refuse(path, fmt::format("face {}: {}", design.faces.size() + 1, face.error()));
       design.faces.push_back(std::move(*face));
     }
   } catch (const Json::exception& error) {

@@ -117,6 +117,53 @@ bool is_numbered(const std::vector<std::string>& lines, const Style& style, std:
   return seen > 3;
 }
 
+// Which columns hold x, y and z, where a head names them: not every machine writes them in this order, or first.
+struct Columns {
+  std::array<std::size_t, 3> of_axis{};
+  std::size_t count = 0;  // of fields in a line
+};
+
+std::optional<Columns> columns_named(std::string_view line, const Style& style) {
+  std::vector<std::string> names;
+  for (const auto& field : fields_of(line, style.separator)) {
+    std::string name = capitals(field.text);
+    std::erase_if(name, [](char c) { return c == '"' || c == '#' || c == '\''; });
+    const auto end = std::ranges::find_if_not(name, [](char c) { return c >= 'A' && c <= 'Z'; });
+    // "[mm]" behind a blank belongs to the name before; between separators every field is a column.
+    if (!style.separator && (name.empty() || name[0] == '[' || name[0] == '(')) continue;
+    names.emplace_back(name.begin(), end);
+  }
+  Columns columns{.count = names.size()};
+  for (const std::size_t axis : {0u, 1u, 2u}) {
+    const std::string wanted(1, "XYZ"[axis]);
+    if (std::ranges::count(names, wanted) != 1) return std::nullopt;
+    columns.of_axis[axis] = static_cast<std::size_t>(std::ranges::find(names, wanted) - names.begin());
+  }
+  return columns;
+}
+
+std::optional<Eigen::Vector3d> at_columns(std::string_view line, const Style& style, const Columns& columns) {
+  const auto fields = fields_of(line, style.separator);
+  if (fields.size() != columns.count) return std::nullopt;
+  Eigen::Vector3d at;
+  for (const std::size_t axis : {0u, 1u, 2u}) {
+    const auto number = number_of(fields[columns.of_axis[axis]].text, style.decimal_comma);
+    if (!number) return std::nullopt;
+    at[static_cast<Eigen::Index>(axis)] = *number;
+  }
+  return at;
+}
+
+std::optional<Eigen::Vector3d> place_of(const Row& row, bool numbered, std::string_view line,
+                                        const Style& style) {
+  if (!numbered) return row.at;
+  std::vector<double> all;
+  for (const auto& field : fields_of(line, style.separator)) {
+    if (const auto number = number_of(field.text, style.decimal_comma)) all.push_back(*number);
+  }
+  return Eigen::Vector3d{all[1], all[2], all[3]};
+}
+
 std::optional<double> unit_in(std::string_view line) {
   std::string words = capitals(line);
   for (char& c : words) {
@@ -160,28 +207,30 @@ std::expected<PointList, Failure> read_points(std::string_view text, const std::
   PointList list;
   std::size_t numbers = 0;
   bool numbered = false;
+  std::optional<Columns> columns;
   for (std::size_t n = 0; n < lines.size(); ++n) {
     const auto row = is_remark(lines[n]) ? std::nullopt : row_of(lines[n], style);
     if (!row) {
-      if (const auto unit = unit_in(lines[n]); unit && list.points.empty()) list.mm_per_unit = unit;
+      if (list.points.empty()) {
+        if (const auto unit = unit_in(lines[n])) list.mm_per_unit = unit;
+        if (const auto named = columns_named(lines[n], style)) columns = named;
+      }
       if (list.points.empty() || is_remark(lines[n])) continue;
       return refused(fmt::format("line {} holds no point: '{:.60}'", n + 1, lines[n]));
     }
     if (list.points.empty()) {
       numbers = row->numbers;
-      numbered = is_numbered(lines, style, numbers);
+      // A head of other columns than the lines below it says nothing of them.
+      if (columns && fields_of(lines[n], style.separator).size() != columns->count) columns.reset();
+      numbered = !columns && is_numbered(lines, style, numbers);
     } else if (row->numbers != numbers) {
       return refused(
           fmt::format("line {} has {} numbers, those before have {}", n + 1, row->numbers, numbers));
     }
-    Eigen::Vector3d at = row->at;
-    if (numbered) {
-      std::vector<double> all;
-      for (const auto& field : fields_of(lines[n], style.separator)) {
-        if (const auto number = number_of(field.text, style.decimal_comma)) all.push_back(*number);
-      }
-      at = {all[1], all[2], all[3]};
-    }
+    const auto place =
+        columns ? at_columns(lines[n], style, *columns) : place_of(*row, numbered, lines[n], style);
+    if (!place) return refused(fmt::format("line {} holds no point: '{:.60}'", n + 1, lines[n]));
+    const Eigen::Vector3d& at = *place;
     if (at.cwiseAbs().maxCoeff() > largest)
       return refused(fmt::format("line {}: a coordinate beyond {:g} cannot be", n + 1, largest));
     if (list.points.size() == most_points) return refused(fmt::format("more than {} points", most_points));
@@ -190,8 +239,9 @@ std::expected<PointList, Failure> read_points(std::string_view text, const std::
   if (list.points.size() < 6)
     return refused(
         fmt::format("{} points were found; 6 or more lines of x y z are wanted", list.points.size()));
-  list.understood = fmt::format("{} points: {}{}", list.points.size(), style.words(),
-                                numbered ? ", a number before each" : "");
+  list.understood = fmt::format("{} points: {}{}{}", list.points.size(), style.words(),
+                                numbered ? ", a number before each" : "",
+                                columns ? ", columns as the head names them" : "");
   return list;
 }
 

@@ -1,7 +1,8 @@
 // Points of a coordinate measuring machine, or any list of places: XYZ, ASC, CSV, `POINT,X,Y,Z,I,J,K`.
 //
 // Tolerated    commas, semicolons, tabs or blanks between numbers; decimal commas (not with separating ones); heads,
-//              remarks (#, //, !, %, $), names or numbers before the coordinates; normals or other columns behind
+//              remarks (#, //, !, %, $), names or numbers before the coordinates; normals or other columns
+//              behind. A head that names x, y and z says which columns they are
 // Units        as a line of the file says ("unit mm", "x [in]"), else nobody knows yet
 // Thread       any; pure
 // Failure      one line: which line, and what is wrong with it

@@ -53,6 +53,11 @@ std::optional<double> number_of(std::string_view field, bool decimal_comma) {
   if (decimal_comma) std::ranges::replace(text, ',', '.');
   if (text.starts_with('+')) text.erase(0, 1);
   if (text.empty() || text.starts_with('+')) return std::nullopt;
+  // Fortran writes 1.5D+01.
+  const auto power = text.find_first_of("Dd");
+  if (power != std::string::npos && power > 0 && power + 1 < text.size() &&
+      (text[power + 1] == '+' || text[power + 1] == '-'))
+    text[power] = 'E';
   double value = 0;
   const auto [stopped, failed] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (failed != std::errc{} || stopped != text.data() + text.size() || !std::isfinite(value))

@@ -21,7 +21,8 @@ struct Field {
 // Between blanks and tabs; or, where `separator` is given, between those, blanks around taken off, empty ones kept.
 std::vector<Field> fields_of(std::string_view line, std::optional<char> separator = {});
 
-// A whole, finite number with a decimal point or, where allowed, a decimal comma; a sign of either kind may lead.
+// A whole, finite number with a decimal point or, where allowed, a decimal comma; a sign of either kind may lead,
+// and the power may be Fortran's (1.5D+01).
 std::optional<double> number_of(std::string_view field, bool decimal_comma = false);
 
 std::string capitals(std::string_view);

@@ -1,6 +1,9 @@
 #include "geometry/inspection/design_faces.hpp"
 
+#include "geometry/splines/closed_polygon.hpp"
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -14,6 +17,9 @@ using Eigen::Vector3d;
 constexpr double samples_a_loop = 960, samples_a_span = 6;  // of the border
 constexpr int most_samples = 4000;                          // a chord
 constexpr int area_grid = 24;                               // per side, for area, mean normal and centroid
+constexpr double same_place = 1e-7;                         // of the domain's length
+constexpr std::size_t most_checked = 20'000;  // corners of a trim: every edge is held against every other one
+constexpr double largest_mm = 1e7;  // of a coordinate: no ship is longer, and a float still tells millimetres
 constexpr double domain_slack = 1e-9;  // of the domain's length: what a writer's rounding may leave
 
 // Even-odd rule over all loops: holes count once more.
@@ -49,6 +55,16 @@ void orient(std::vector<TrimPolygon>& loops) {
   }
 }
 
+// Corners in one place, as a writer leaves them where two of its curves meet, are taken as one.
+bool crosses(const TrimPolygon& loop, double apart) {
+  TrimPolygon corners;
+  for (const auto& p : loop) {
+    if (corners.empty() || (p - corners.back()).norm() > apart) corners.push_back(p);
+  }
+  while (corners.size() > 1 && (corners.front() - corners.back()).norm() <= apart) corners.pop_back();
+  return corners.size() <= most_checked && crosses_itself(corners);
+}
+
 std::expected<void, Error> check_trims(const PreparedSurface& surface, std::span<const TrimPolygon> trims) {
   const double u0 = surface.along_u().first(), u1 = surface.along_u().last();
   const double v0 = surface.along_v().first(), v1 = surface.along_v().last();
@@ -60,8 +76,15 @@ std::expected<void, Error> check_trims(const PreparedSurface& surface, std::span
       if (p.x() < u0 - slack_u || p.x() > u1 + slack_u || p.y() < v0 - slack_v || p.y() > v1 + slack_v)
         return std::unexpected(Error::outside_domain);
     }
+    if (crosses(loop, same_place * std::max(u1 - u0, v1 - v0))) return std::unexpected(Error::self_crossing);
   }
   return {};
+}
+
+bool is_too_large(const BSplineSurface& s) {
+  return std::ranges::any_of(std::array{&s.x, &s.y, &s.z}, [](const Eigen::MatrixXd* net) {
+    return net->size() > 0 && net->cwiseAbs().maxCoeff() > largest_mm;
+  });
 }
 
 // The border's tangent plane at a place of a chord; no length where there is none.
@@ -120,6 +143,7 @@ std::expected<DesignFaces, Flaw> DesignFaces::from(std::span<const DesignFace> d
     if (!designed[n].surface.bicubic()) return std::unexpected(Flaw{Error::too_few_points, n});
     auto surface = PreparedSurface::from(designed[n].surface);
     if (!surface) return std::unexpected(Flaw{surface.error(), n});
+    if (is_too_large(designed[n].surface)) return std::unexpected(Flaw{Error::too_large, n});
     Face face{.surface = std::move(*surface),
               .trims = designed[n].trims,
               .border = {},
@@ -133,6 +157,7 @@ std::expected<DesignFaces, Flaw> DesignFaces::from(std::span<const DesignFace> d
     if (all.faces_[n].area > all.faces_[largest].area) largest = n;
   }
   all.join(largest);
+  if (all.border_.empty()) return std::unexpected(Flaw{Error::no_border, largest});
   return all;
 }
 

@@ -8,7 +8,9 @@
 // Allocation   in from() only
 // Failure      from(): the Flaw says which face. too_few_points (no face at all, or a face that is not a bicubic net),
 //              knots_not_increasing, not_finite; outside_domain: a trim that leaves the face's knots;
-//              singular_parametrization: a face without area
+//              self_crossing: a trim of up to 20,000 corners that
+//              crosses itself; singular_parametrization: a face without area; too_large: beyond
+//              1e7 mm; no_border: the same face twice, or a tube
 #pragma once
 
 #include "geometry/error.hpp"

@@ -2,8 +2,8 @@
 #include "firmware_like/inspection/inspection.hpp"
 
 #include "firmware_like/inspection/design_reader.hpp"
-#include "firmware_like/inspection/inspection_files.hpp"
 #include "firmware_like/inspection/frame_page.hpp"
+#include "firmware_like/inspection/inspection_files.hpp"
 #include "hal/temporary_folder.hpp"
 
 #include <doctest/doctest.h>
@@ -283,6 +283,18 @@ TEST_CASE("templates: gaps at every pin, bend, twist, and the list comes back as
   CHECK(frame_page(*found).find("bend more") != std::string::npos);
 }
 
+TEST_CASE("a face of lower degree is the surface that its control points say") {
+  const hal::TemporaryFolder folder;
+  // z = x y / 1000 over 400 x 300 mm: four corners at degree 1.
+  std::ofstream{folder.file("d.json")}
+      << R"({"format":"moldloft-design","version":1,"unit":"mm","faces":[{"degree_u":1,"degree_v":1,)"
+      << R"("knots_u":[0,0,1,1],"knots_v":[0,0,1,1],"control":[[0,0,0],[0,300,0],[400,0,0],[400,300,120]]}]})";
+  const auto design = read_design(folder.file("d.json"), "");
+  REQUIRE_MESSAGE(design.has_value(), design.error().what);
+  const auto at = design->faces[0].surface.at(0.25, 0.6).value;
+  CHECK((at - Eigen::Vector3d{100, 180, 18}).norm() < 1e-9);
+}
+
 TEST_CASE("design.json and inspection.json say what they hold, odd files are refused") {
   const hal::TemporaryFolder folder;
   const auto surface = surface_of(hull, 400, 300);
@@ -306,9 +318,9 @@ TEST_CASE("design.json and inspection.json say what they hold, odd files are ref
       {"{\"format\":\"moldloft-design\",\"version\":2}", "version 1"},
       {"{\"format\":\"moldloft-design\",\"version\":1,\"unit\":\"inch\"}", "in mm"},
       {"{\"format\":\"moldloft-design\",\"version\":1,\"unit\":\"mm\",\"faces\":[]}", "no face"},
-      {"{\"format\":\"moldloft-design\",\"version\":1,\"unit\":\"mm\",\"faces\":[{\"degree_u\":2,\"degree_"
-       "v\":3}]}",
-       "bicubic"},
+      {"{\"format\":\"moldloft-design\",\"version\":1,\"unit\":\"mm\",\"faces\":[{\"degree_u\":5,\"degree_"
+       "v\":3,\"knots_u\":[0],\"knots_v\":[0]}]}",
+       "face 1: is of a degree beyond 3"},
       {"{\"format\":\"moldloft-design\",\"version\":1,\"unit\":\"mm\",\"faces\":[{\"degree_u\":3,\"degree_"
        "v\":3,\"knots_u\":[0],\"knots_v\":[0],\"control\":[]}]}",
        "do not fit"},
@@ -320,6 +332,21 @@ TEST_CASE("design.json and inspection.json say what they hold, odd files are ref
     REQUIRE_FALSE(refused);
     CHECK(refused.error().what.find(says) != std::string::npos);
   }
+  // A net whose points are no points is told by the point's number.
+  auto broken = design_json({&face, 1}, "by hand");
+  broken["faces"][0]["control"][4] = {1, 2};
+  std::ofstream{folder.file("odd.json")} << json_text(broken);
+  CHECK(read_design(folder.file("odd.json"), "")
+            .error()
+            .what.find("face 1: control point 5 is not three numbers") != std::string::npos);
+  // Equal weights change nothing, others do.
+  auto weighted = design_json({&face, 1}, "by hand");
+  weighted["faces"][0]["weights"] = Json(std::vector<double>(surface.x.size(), 2.0));
+  std::ofstream{folder.file("odd.json")} << json_text(weighted);
+  CHECK(read_design(folder.file("odd.json"), ""));
+  weighted["faces"][0]["weights"][1] = 3.0;
+  std::ofstream{folder.file("odd.json")} << json_text(weighted);
+  CHECK(read_design(folder.file("odd.json"), "").error().what.find("rational") != std::string::npos);
   CHECK_FALSE(read_design(folder.file("nothing"), ""));
   CHECK(read_design(folder.file("d.json"), "furlong").error().what.find("--unit") != std::string::npos);
 }

@@ -51,24 +51,30 @@ TEST_CASE("points in every shape in which machines write them are the same point
                                 number(-2.25 * i, decimal), number(1.125, decimal), i + 1);
            });
   };
-  const Shape shapes[] = {{"xyz", lines("{0} {1} {2}")},
-                          {"tabs", lines("{0}\t{1}\t{2}")},
-                          {"csv", lines("{0},{1},{2}", '.', "x,y,z\n")},
-                          {"semicolons and decimal commas", lines("{0};{1};{2}", ',', "X;Y;Z\n")},
-                          {"blanks and decimal commas", lines("{0}  {1}  {2}", ',')},
-                          {"POINT", lines("POINT,{0},{1},{2},0,0,1")},
-                          {"DMIS-like names", lines("P{3} {0} {1} {2}")},
-                          {"numbered", lines("{3} {0} {1} {2}", '.', "# made by hand\n// twice\n")},
-                          {"normals behind", lines("{0} {1} {2} 0 0 1")},
-                          {"a mark and CR LF", "\xEF\xBB\xBF" + lines("{0};{1};{2}\r", ',')},
-                          {"plus signs", lines("+{0} {1} +{2}")}};
+  const Shape shapes[] = {
+      {"xyz", lines("{0} {1} {2}")},
+      {"tabs", lines("{0}\t{1}\t{2}")},
+      {"csv", lines("{0},{1},{2}", '.', "x,y,z\n")},
+      {"semicolons and decimal commas", lines("{0};{1};{2}", ',', "X;Y;Z\n")},
+      {"blanks and decimal commas", lines("{0}  {1}  {2}", ',')},
+      {"POINT", lines("POINT,{0},{1},{2},0,0,1")},
+      {"DMIS-like names", lines("P{3} {0} {1} {2}")},
+      {"numbered", lines("{3} {0} {1} {2}", '.', "# made by hand\n// twice\n")},
+      {"normals behind", lines("{0} {1} {2} 0 0 1")},
+      {"a mark and CR LF", "\xEF\xBB\xBF" + lines("{0};{1};{2}\r", ',')},
+      {"other columns first", lines("{1},{0},{2}", '.', "Y [mm],X [mm],Z [mm]\n")},
+      {"a quoted head", lines("9;;{2};{0};{1}", ',', "\"pin\";\"\";\"Z\";\"X\";\"Y\"\n")},
+      {"numbers with gaps", lines("7{3}0,{0},{1},{2}", '.', "id,x,y,z\n")},
+      {"a head of other lines", lines("{0} {1} {2}", '.', "y x z of plate 7\n")},
+      {"Fortran's powers", lines("{0}D+00 {1}D+00 {2}d+00")},
+      {"plus signs", lines("+{0} {1} +{2}")}};
   for (const auto& shape : shapes) {
     CAPTURE(shape.of);
     const auto list = read_points(shape.text, "p");
     REQUIRE_MESSAGE(list.has_value(), list.error().what);
     REQUIRE(list->points.size() == 8);
     CHECK((list->points[3] - Eigen::Vector3d{31.5, -6.75, 1.125}).norm() < 1e-9);
-    CHECK_FALSE(list->mm_per_unit);
+    CHECK(list->mm_per_unit.value_or(1.0) == 1.0);
   }
 }
 

@@ -252,6 +252,16 @@ TEST_CASE("what cannot be aligned says why") {
   CHECK_FALSE(DesignFaces::from({}));
   DesignFace outside{surface, {{{0, 0}, {1.5, 0}, {1, 1}}}};
   CHECK(DesignFaces::from({&outside, 1}).error() == Flaw{Error::outside_domain, 0});
+  DesignFace bow_tie{surface, {{{0, 0}, {1, 1}, {1, 0}, {0, 1}}}};
+  CHECK(DesignFaces::from({&bow_tie, 1}).error() == Flaw{Error::self_crossing, 0});
+  // Corners in one place are no crossing: that is how trims of several curves come.
+  DesignFace repeated{surface, {{{0, 0}, {1, 0}, {1, 1e-12}, {1, 1}, {1, 1}, {0, 1}, {0, 0}}}};
+  CHECK(DesignFaces::from({&repeated, 1}));
+  const std::vector<DesignFace> twice{face, face};
+  CHECK(DesignFaces::from(twice).error().error == Error::no_border);
+  DesignFace beyond{surface};
+  beyond.surface.x.array() += 1e200;
+  CHECK(DesignFaces::from({&beyond, 1}).error() == Flaw{Error::too_large, 0});
   const std::vector<Vector3d> line{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}};
   CHECK(motion_between(line, line).error() == Error::collinear);
 }
