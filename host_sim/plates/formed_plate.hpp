@@ -51,7 +51,7 @@ HeightDifference height_difference(const Plate& formed, const Plate& design);
 std::expected<std::shared_ptr<const Plate>, SimError> make_formed_plate(std::shared_ptr<const Plate>,
                                                                         const Mistakes&);
 
-// A four-sided plate as a bicubic surface over its outline, through the plate at some thousand places: within 1e-3 mm
+// A four-sided plate as a bicubic surface over its outline, through the plate at some thousand places: within 1e-4 mm
 // of formulas, on the corners and the straight sides exactly.
 geometry::BSplineSurface spline_of(const Plate&,
                                    const geometry::RigidMotion& placed = geometry::RigidMotion::Identity());

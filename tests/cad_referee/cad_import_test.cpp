@@ -21,6 +21,7 @@
 #include <Geom_SphericalSurface.hxx>
 #include <IGESControl_Writer.hxx>
 #include <Interface_Static.hxx>
+#include <STEPControl_Controller.hxx>
 #include <STEPControl_Writer.hxx>
 #include <TColStd_Array1OfInteger.hxx>
 #include <TColStd_Array1OfReal.hxx>
@@ -69,7 +70,8 @@ TopoDS_Face face_of(const Handle(Geom_Surface) & surface) {
 }
 
 void write_step(const TopoDS_Shape& shape, const std::string& path, const char* unit = "MM") {
-  Interface_Static::SetCVal("write.step.unit", unit);
+  STEPControl_Controller::Init();  // sets up where the settings are kept; a writer takes them when it is made
+  REQUIRE(Interface_Static::SetCVal("write.step.unit", unit));
   STEPControl_Writer writer;
   REQUIRE(writer.Transfer(shape, STEPControl_AsIs) == IFSelect_RetDone);
   REQUIRE(writer.Write(path.c_str()) == IFSelect_RetDone);
